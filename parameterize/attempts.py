@@ -1,8 +1,12 @@
-"""The starts, one after the other, until a map has no faults: the network, a cube that grows, an extended layout."""
+"""The starts, one after the other, until a map has no faults: the network, a cube that grows, an extended layout.
+
+A body with handles, and one with limbs, starts from blocks along its skeleton.
+"""
 
 import logging
 
 from .checkpoint import Checkpoints
+from .starts.blocks import BLOCKS
 from .starts.extension import EXTENSION
 from .starts.growth import GROWTH, LAST, STIFF
 from .starts.network import NETWORK
@@ -14,13 +18,21 @@ _log = logging.getLogger(__name__)
 STARTS: tuple[Start, ...] = (NETWORK, GROWTH, EXTENSION, STIFF, LAST)
 
 
-def next_start(tried: tuple[Tried, ...]) -> Start | None:
+def starts_of(task: Task) -> tuple[Start, ...]:
+    """Return the starts that suit the body and the options, in their order."""
+    if task.surface.genus or (task.config.blocks or 1) > 1:
+        return (BLOCKS,)
+    on_one_cube = task.config.blocks == 1 or task.given_corners is not None or not task.choice.blocks
+    return STARTS if on_one_cube else (BLOCKS, *STARTS)
+
+
+def next_start(tried: tuple[Tried, ...], starts: tuple[Start, ...]) -> Start | None:
     """Return the start that follows those that were tried; None where a map has no faults or no start is left.
 
     A stiffer growth follows a growth that ends far from the surface, certified or not, and one that meets itself.
     """
     begun = [one.start for one in tried]
-    left = [start for start in STARTS if start not in begun]
+    left = [start for start in starts if start not in begun]
     grown = tried[begun.index(GROWTH)].attempt if GROWTH in begun else None
     if STIFF in left and grown is not None and grown.distance > GROWTH.far:
         return STIFF
@@ -32,7 +44,9 @@ def next_start(tried: tuple[Tried, ...]) -> Start | None:
 def attempts(task: Task, checkpoints: Checkpoints) -> tuple[Tried, ...]:
     """Make maps until one has no faults, at most as many as the options say; return all, with at least one map."""
     tried: tuple[Tried, ...] = ()
-    while len(tried) < task.most_starts and (start := next_start(tried)) is not None:
+    starts = starts_of(task)
+    most = task.most_starts + starts.count(BLOCKS)
+    while len(tried) < most and (start := next_start(tried, starts)) is not None:
         if tried:
             _tell(tried[-1], start)
         before = dict(task.seconds)

@@ -46,7 +46,7 @@ def optimize_coarse_first(
     """
     report: dict[str, Any] = {"history": history, "progress": progress}
     fine = (open_uniform_knots(config.control_points, config.degree),) * 3
-    if len(fine[0]) == len(start.knots[0]):
+    if not start.nets.one_cube or len(fine[0]) == len(start.knots[0]):
         return *optimize(start, fit, config, schedule, weights, checkpoints=checkpoints, **report), fit
     longer = (len(fine[0]) / len(start.knots[0])) ** 1.5  # about, of a step on all control points
     begun = min(schedule.grown or PATIENT_ROUNDS, schedule.rounds - 1)  # at least one round is on all
@@ -55,6 +55,7 @@ def optimize_coarse_first(
     first = replace(schedule, rounds=begun, usual_steps=usual)
     kept = checkpoints.of_part("coarse")
     found, earlier = optimize(start, fit, config, first, weights, checkpoints=kept, **report)
-    start, fit = found.spline.interpolated(fine), fit.on_knots(fine)
+    start = found.spline.interpolated(fine)
+    fit = fit.on_nets(start.nets)
     found, course = optimize(start, fit, config, schedule, weights, checkpoints=checkpoints, begun=begun, **report)
     return found, course.after(earlier), fit

@@ -98,6 +98,9 @@ class Config:
         The tries in all, at most 5: where a shape is hard to train, or the trained map is not certified, one is grown.
         Where that is not certified or meets itself, a layout is extended and a stiffer map grown; in the end one that
         may be farther from the surface.
+    blocks : int or None
+        The most blocks of a map: 1 for one cube, a larger number for blocks along the skeleton, None for whichever
+        suits the body.
     steps_factor : float
         By which `scaled` has lengthened all stages: it also counts for steps that no other option sets.
 
@@ -115,6 +118,7 @@ class Config:
     spline: SplineConfig
     starts: int = 5
     refinement: RefinementConfig | None = None
+    blocks: int | None = None
     steps_factor: float = 1.0
 
     def scaled(self, factor: float) -> Config:
@@ -145,6 +149,15 @@ class Config:
             given = f"between {fewest}, the number of the first map, and {MAX_CONTROL_POINTS}"
             raise ValueError(f"max_control_points must lie {given}, got {max_control_points}")
         return replace(self, refinement=RefinementConfig(tolerance, max_control_points))
+
+    def with_blocks(self, blocks: int | None) -> Config:
+        """Return the same options with at most so many blocks; None for as many as suit the body.
+
+        Raises ValueError for a number that is not whole or not positive.
+        """
+        if blocks is not None and (not isinstance(blocks, Integral) or isinstance(blocks, bool) or blocks < 1):
+            raise ValueError(f"blocks must be None or a whole number from 1 on, got {blocks!r:.80}")
+        return replace(self, blocks=blocks)
 
     def with_control_points(self, n: int) -> Config:
         """Return the same options with n x n x n control points.

@@ -22,6 +22,7 @@ from .optimization.newton import LEAST_STEPS
 from .optimization.optimized import Optimized
 from .optimization.phases import FIRM_ROUNDS, Polish, Schedule, Separate, Unfold
 from .optimization.rounds import optimize
+from .optimization.spans import in_blocks
 from .optimization.surface_distance import SurfaceFit
 from .optimization.term import Weights
 from .progress import History, ProgressCallback
@@ -143,7 +144,7 @@ class _Spots:
         volume = found.spline.volume
         gaps = two_sided(volume, fit.points, fit.places.triangles)
         distance = gaps.summary().scaled(1.0 / float(np.linalg.norm(np.ptp(fit.points, axis=0))))
-        unproved = found.certificate.unproved
+        unproved = found.unproved[:, 1:]
         level = Level(volume.shape, distance.rms, distance.max, len(unproved))
         if course is not None:
             level = replace(level, rounds=dict(course.rounds), seconds=course.seconds, ending=str(course.ending))
@@ -227,18 +228,20 @@ def _optimized_on(
     """Insert the knots and continue with the rounds that follow those of a certified map; return their course, too."""
     phases = (Unfold(), Separate(), Polish(rounds=POLISH))
     schedule = Schedule(phases, FIRM_ROUNDS + ROUNDS, (LEAST_STEPS,) * (FIRM_ROUNDS + 2), gain=_GAIN)
-    start, surface = volume.on_knots(finer), fit.on_knots(finer)
+    start = volume.on_knots(finer)
+    first = SplineMap.of(start)
+    surface = fit.on_nets(first.nets)
     form = DeterminantForm(start)
     nearly = np.flatnonzero(np.ldexp(form.survey()[0], form.exponent) < MIN_COEFFICIENT)
     found, course = optimize(
-        SplineMap.of(start),
+        first,
         surface,
         config,
         schedule,
         replace(weights, surface=_CLOSER * weights.surface),
         checkpoints=checkpoints,
         begun=FIRM_ROUNDS,
-        watched=form.numbers(nearly),
+        watched=in_blocks([form.numbers(nearly)]),
         **report,
     )
     _log.info("the rounds end: %s; %s", course.ending, course.ending.sentence)

@@ -75,14 +75,14 @@ def test_turns_that_overlap_are_parted():
     assert check_boundary(volume).injective is False
     control = control_of(volume)
     for _ in range(4):
-        penalty = contact_penalty(SplineMap(3, volume.knots, control), GAP)
+        penalty = contact_penalty(SplineMap.of(volume).with_control(control), GAP)
         _, gradient = penalty.energy_and_gradient(control)
         curvature = penalty.curvature(control)
         step = conjugate_gradients(
             lambda x, bend=curvature: bend(x) + 1e-6 * x, -gradient, lambda x: x, tolerance=1e-6, max_iterations=200
         )
         control = control + step.x
-    parted = type(volume)(volume.degrees, volume.knots, np.moveaxis(control, 0, -1))
+    parted = SplineMap.of(volume).with_control(control).volume
     assert check_boundary(parted).injective is True
 
 

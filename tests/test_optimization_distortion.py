@@ -3,14 +3,16 @@ import pytest
 from test_optimization_rounds import KNOTS, as_volume, gauss_mean, mean_arap, wavy_control
 
 from parameterize.optimization.determinant_penalty import DeterminantPenalty
-from parameterize.optimization.distortion import _MIN_DET, Distortion
+from parameterize.optimization.distortion import _MIN_DET, BlockDistortion, Distortion
+from parameterize.optimization.spans import in_blocks
 from parameterize.spline.bspline import greville, open_uniform_knots
+from parameterize.spline.nets import Nets
 from parameterize.spline.volume import BSplineVolume
 
 
 def test_distortion_is_the_quadrature_of_the_arap_energy():
     control = wavy_control(0.02)
-    distortion = Distortion(KNOTS, 3, gauss=(3, 3))
+    distortion = BlockDistortion(KNOTS, 3, gauss=(3, 3))
     energy, _ = distortion.energy_and_gradient(control)
     assert energy == pytest.approx(mean_arap(as_volume(control)), rel=1e-9)
     assert distortion.folded == 0
@@ -19,7 +21,7 @@ def test_distortion_is_the_quadrature_of_the_arap_energy():
 def test_folded_points_are_counted():
     control = wavy_control(0.0)
     control[0] *= -1.0
-    distortion = Distortion(KNOTS, 3, gauss=(3, 1))
+    distortion = BlockDistortion(KNOTS, 3, gauss=(3, 1))
     distortion.energy_and_gradient(control)
     assert distortion.folded == (2 * 3 + 2 * 1) ** 3  # four spans a direction
 
@@ -39,7 +41,7 @@ def dumbbell():
 
 def test_less_det_is_asked_for_where_a_part_is_far_thinner():
     control, knots = dumbbell()
-    distortion = Distortion(knots, 3, gauss=(1, 1))
+    distortion = BlockDistortion(knots, 3, gauss=(1, 1))
     before = [energy(distortion, control, penalty) for penalty in (0.0, 1.0)]
     shares = distortion.lower_floors(control, 0.05)
     assert shares[..., [0, -1]] == pytest.approx(1.0)
@@ -57,9 +59,11 @@ def test_less_det_is_asked_for_where_a_part_is_far_thinner():
 def test_floors_that_are_lowered_keep_the_gradient_true():
     control, knots = dumbbell()
     control = 0.7 * control + 0.01 * np.random.default_rng(0).normal(size=control.shape)
-    distortion, determinants = Distortion(knots, 3), DeterminantPenalty(knots, 3)
-    distortion.penalty = 1e3
-    determinants.activate(np.argwhere(np.ones((20, 20, 20))))
+    nets = Nets(3, (knots,))
+    control = control.reshape(3, -1)
+    distortion, determinants = Distortion(nets, nets.knots), DeterminantPenalty(nets, nets.knots)
+    distortion.terms[0].penalty = 1e3
+    determinants.activate(in_blocks([np.argwhere(np.ones((20, 20, 20)))]))
     determinants.lower_floors(distortion.lower_floors(control, 0.05))
     direction = np.random.default_rng(1).normal(size=control.shape)
 
@@ -73,7 +77,7 @@ def test_floors_that_are_lowered_keep_the_gradient_true():
 
 @pytest.mark.parametrize("limit", [100.0, 0.3])  # nothing above it; most points above it
 def test_curvature_is_the_second_derivative_where_the_map_stretches(limit):
-    distortion = Distortion(KNOTS, 3)
+    distortion = BlockDistortion(KNOTS, 3)
     distortion.limit = limit
     control, step = 1.6 * wavy_control(0.02), wavy_control(0.5, seed=4) - wavy_control(0.0)
     ahead, behind = (distortion.energy_and_gradient(control + s * 1e-5 * step)[1] for s in (1.0, -1.0))
@@ -83,7 +87,7 @@ def test_curvature_is_the_second_derivative_where_the_map_stretches(limit):
 
 
 def test_curvature_stays_positive_where_the_energy_bends_down():
-    distortion, control = Distortion(KNOTS, 3), 0.4 * wavy_control(0.05)
+    distortion, control = BlockDistortion(KNOTS, 3), 0.4 * wavy_control(0.05)
     distortion.penalty = 20.0
     for seed in range(5):
         step = (wavy_control(0.5, seed) - wavy_control(0.0)).astype(np.float32)
@@ -92,7 +96,7 @@ def test_curvature_stays_positive_where_the_energy_bends_down():
 
 def test_damping_costs_the_squared_change_of_the_jacobian():
     identity = wavy_control(0.0)
-    distortion = Distortion(KNOTS, 3, gauss=(3, 3))
+    distortion = BlockDistortion(KNOTS, 3, gauss=(3, 3))
     step = (wavy_control(0.5, seed=2) - identity).astype(np.float32)
     free = float((step * distortion.curvature(identity)(step)).sum())
     distortion.damping = 3.0

@@ -7,16 +7,17 @@ from parameterize.optimization.edge_attraction import EdgeAnchors, edge_points
 from parameterize.optimization.sliding import SlidingParameters
 from parameterize.optimization.surface_distance import TANGENTIAL, SurfaceFit
 from parameterize.spline.bspline import greville, open_uniform_knots
+from parameterize.spline.nets import Nets
 from parameterize.surface.geometry import vertex_quadrics, vertex_weights
 
-KNOTS = (open_uniform_knots(6, 3),) * 3  # three spans a direction
+NETS = Nets(3, ((open_uniform_knots(6, 3),) * 3,))  # three spans a direction
 
 
 def anchors_on_a_ball(radius=0.5, given_corners=None):
     points, faces = ball(2000)
     points = 0.5 + radius * points
     fit = SurfaceFit(
-        SlidingParameters(KNOTS, 3, snap(points), faces),
+        SlidingParameters(NETS, snap(points), triangles=faces),
         points,
         vertex_quadrics(points, faces, TANGENTIAL),
         vertex_weights(points, faces, len(points)),
@@ -26,14 +27,15 @@ def anchors_on_a_ball(radius=0.5, given_corners=None):
 
 
 def unit_cube():
-    row = greville(KNOTS[0], 3)
-    return np.stack(np.meshgrid(row, row, row, indexing="ij"))
+    row = greville(NETS.knots[0][0], 3)
+    return np.stack(np.meshgrid(row, row, row, indexing="ij")).reshape(3, -1)
 
 
 def test_edge_points_are_the_corners_and_two_a_span():
-    points = edge_points(KNOTS)
+    points, faces = edge_points(NETS)
     assert len(points) == 8 + 12 * (2 * 3 - 1)
     assert (((points == 0.0) | (points == 1.0)).sum(axis=1) >= 2).all()
+    assert (points[np.arange(len(points)), faces // 2] == faces % 2).all()
     assert {tuple(c) for c in CORNERS} <= {tuple(p) for p in points}
 
 
@@ -42,7 +44,7 @@ def test_anchors_measure_how_far_the_edges_are_from_the_surface():
     anchors.aim(control, hold=False)
     energy, _ = anchors.fit.energy_and_gradient(control)
     # F is the identity, the surface a ball of radius 1/2: nearly all of the distance is along the ball's normal
-    distance = np.linalg.norm(edge_points(KNOTS) - 0.5, axis=1) - 0.5
+    distance = np.linalg.norm(edge_points(NETS)[0] - 0.5, axis=1) - 0.5
     assert energy == pytest.approx((distance**2).mean(), rel=0.02)
 
 
@@ -52,7 +54,8 @@ def test_what_they_pull_on_comes_closer():
     before, gradient = anchors.fit.energy_and_gradient(control)
     after, _ = anchors.fit.energy_and_gradient(control - gradient)
     assert after < before
-    inward = (gradient * (control - 0.5)).sum(0)  # downhill leads towards the centre, at all eight corners
+    # downhill leads towards the centre, at all eight corners
+    inward = NETS.of_block((gradient * (control - 0.5)).sum(0), 0)
     assert (inward[[0, 0, 0, 0, -1, -1, -1, -1], [0, 0, -1, -1] * 2, [0, -1] * 4] > 0.0).all()
 
 
@@ -79,5 +82,5 @@ def test_given_corners_are_held_beside_the_others_and_alone():
     np.testing.assert_array_equal(aimed, wanted)
     anchors.release()
     _, gradient = anchors.fit.energy_and_gradient(control)
-    downhill = -gradient[:, [0, -1]][:, :, [0, -1]][:, :, :, [0, -1]].reshape(3, 8).T
+    downhill = -NETS.of_block(gradient, 0)[:, [0, -1]][:, :, [0, -1]][:, :, :, [0, -1]].reshape(3, 8).T
     np.testing.assert_allclose(downhill / np.abs(downhill).max(), (wanted - CORNERS) / 0.23, atol=1e-12)

@@ -7,10 +7,11 @@ from parameterize.optimization.operators import ControlRows
 from parameterize.optimization.sliding import SlidingParameters
 from parameterize.optimization.surface_distance import SurfaceFit
 from parameterize.spline.bspline import greville, open_uniform_knots
+from parameterize.spline.nets import Nets
 from parameterize.surface.geometry import vertex_normals
 
 FLOOR = 0.3
-KNOTS = (open_uniform_knots(6, 3),) * 3
+NETS = Nets(3, ((open_uniform_knots(6, 3),) * 3,))
 
 
 def random_penalty(points=40, controls=50):
@@ -49,8 +50,8 @@ def test_energy_gradient_and_gauss_newton_curvature_are_those_of_the_formula():
 
 def box_fit(triangle_at):
     """A tetrahedron's worth of triangles on each face of the unit cube, and the identity's control points."""
-    row = greville(KNOTS[0], 3)
-    control = np.stack(np.meshgrid(row, row, row, indexing="ij"))
+    row = greville(NETS.knots[0][0], 3)
+    control = np.stack(np.meshgrid(row, row, row, indexing="ij")).reshape(3, -1)
     corners, faces = [], []
     for side in range(6):
         axis = side // 2
@@ -61,7 +62,7 @@ def box_fit(triangle_at):
         corners.extend(piece)
     points, faces = np.array(corners), np.array(faces)
     quadrics, weights = np.tile(np.eye(3), (18, 1, 1)), np.full(18, 1.0 / 18.0)
-    return SurfaceFit(SlidingParameters(KNOTS, 3, points, faces), points, quadrics, weights), control
+    return SurfaceFit(SlidingParameters(NETS, points, triangles=faces), points, quadrics, weights), control
 
 
 @pytest.mark.parametrize("mirrored", [False, True])

@@ -14,10 +14,12 @@ from parameterize.optimization.phases import Polish, Schedule, Separate, Shape, 
 from parameterize.optimization.state import State
 from parameterize.optimization.term import Weights
 from parameterize.spline.bspline import greville, open_uniform_knots
+from parameterize.spline.nets import Nets
 from parameterize.spline.spline_map import SplineMap
 from parameterize.starts.growth import Grow
 
 KNOTS = (open_uniform_knots(14, 3),) * 3
+NETS = Nets(3, (KNOTS,))
 
 
 def after(number, *, meets=False, yields=True, **given):
@@ -100,11 +102,11 @@ def cube():
 
 
 def state_of(control, fit=None, number=4):
-    fit = (fit or surface_fit()).on_knots(KNOTS)
+    fit = (fit or surface_fit()).on_nets(NETS)
     places = fit.places.parameters, fit.places.cube_faces
-    best = Optimized.of(SplineMap(3, KNOTS, control))
-    state = State(SplineEnergy(KNOTS, fit, Weights()), best.spline, best, places, near=False, number=number, halved=2)
-    state.best_square = fit.mean_square(control)
+    best = Optimized.of(SplineMap.on_cube(3, KNOTS, control))
+    state = State(SplineEnergy(NETS, fit, Weights()), best.spline, best, places, near=False, number=number, halved=2)
+    state.best_square = fit.mean_square(best.spline.control)
     return state
 
 
@@ -115,9 +117,10 @@ def test_what_a_polish_folds_is_moved_back_there_and_nowhere_else():
     state = state_of(start)
     fit = state.energy.surface
     fit.give_way(np.full(len(fit.points), 0.8))
-    kept = Polish().amended(state, Optimized.of(SplineMap(3, KNOTS, better)))
+    kept = Polish().amended(state, Optimized.of(SplineMap.on_cube(3, KNOTS, better)))
     assert kept.certificate.verdict == "certified"
-    moved_back, moved = (kept.spline.control == start).all(axis=0), (kept.spline.control == better).all(axis=0)
+    control = NETS.of_block(kept.spline.control, 0)
+    moved_back, moved = (control == start).all(axis=0), (control == better).all(axis=0)
     assert moved_back[2, 2, 2] and moved[9:].all() and bool((moved_back | moved).all())
     near = (fit.places.parameters < 0.2).all(axis=1)
     assert np.all(fit.yielding[near] == 0.2) and np.median(fit.yielding) == 0.8  # a quarter near the fold
@@ -138,8 +141,8 @@ def test_a_polish_gives_the_data_more_weight_unless_the_map_folds_again():
 def test_few_spans_that_stay_unproved_are_smoothed(number, smooth):
     folded = cube()
     folded[0, 6, 6, 6] += 0.33
-    found = Optimized.of(SplineMap(3, KNOTS, folded))
-    assert 0 < len(found.certificate.unproved) <= 10
+    found = Optimized.of(SplineMap.on_cube(3, KNOTS, folded))
+    assert 0 < len(found.unproved) <= 10
     amended = Unfold().amended(state_of(cube(), number=number), found)
     assert (amended.certificate.verdict == "certified") == smooth and (amended is found) != smooth
 
@@ -148,22 +151,22 @@ def test_many_spans_are_not_smoothed(monkeypatch):
     folded = cube()
     folded[0, 6, 6, 6] += 0.33
     monkeypatch.setattr("parameterize.optimization.phases._MOST_SMOOTHED", 0)
-    found = Optimized.of(SplineMap(3, KNOTS, folded))
+    found = Optimized.of(SplineMap.on_cube(3, KNOTS, folded))
     assert Unfold().amended(state_of(cube()), found) is found
 
 
 def test_the_surface_gives_way_where_sheets_are_pushed_apart(monkeypatch):
     state = state_of(cube())
-    monkeypatch.setattr(SplineEnergy, "watch_contact", lambda *_: np.array([[0, 5, 5]]))
+    monkeypatch.setattr(SplineEnergy, "watch_contact", lambda *_: np.array([[0, 0, 5, 5]]))
     Separate().begin(state)
     fit = state.energy.surface
     assert fit.yielding.min() == 0.0625 and np.median(fit.yielding) == 1.0
 
 
 def test_a_certified_map_counts_by_what_is_proved_of_its_boundary():
-    certified = Optimized.of(SplineMap(3, KNOTS, cube())).certificate
+    certified = Optimized.of(SplineMap.on_cube(3, KNOTS, cube())).certificate
     apart, undecided, meets = (
-        Optimized(SplineMap(3, KNOTS, cube()), certified, injective) for injective in (True, None, False)
+        Optimized(SplineMap.on_cube(3, KNOTS, cube()), certified, injective) for injective in (True, None, False)
     )
     assert apart.rank < undecided.rank < meets.rank
     assert apart.faults == undecided.faults < meets.faults

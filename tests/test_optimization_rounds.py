@@ -13,11 +13,13 @@ from parameterize.optimization.energy import SplineEnergy
 from parameterize.optimization.phases import RAMP, Polish, Schedule, Separate, Shape, Unfold
 from parameterize.optimization.rounds import optimize
 from parameterize.optimization.sliding import SlidingParameters
+from parameterize.optimization.spans import in_blocks
 from parameterize.optimization.surface_distance import TANGENTIAL, SurfaceFit
 from parameterize.optimization.term import RoundWeights, Weights
 from parameterize.progress import History
 from parameterize.quality.distortion import arap
 from parameterize.spline.bspline import gauss_points, greville, open_uniform_knots
+from parameterize.spline.nets import Nets
 from parameterize.spline.spline_map import SplineMap
 from parameterize.spline.volume import BSplineVolume
 from parameterize.surface.geometry import vertex_quadrics, vertex_weights
@@ -26,6 +28,8 @@ DESCEND = "parameterize.optimization.rounds.descend"
 CONFIG = SplineConfig(control_points=7, steps=5)
 SCHEDULE = Schedule((Shape(RAMP), Unfold(RAMP, far=1.0), Separate(RAMP), Polish(RAMP)), rounds=6, usual_steps=())
 KNOTS = (open_uniform_knots(7, 3),) * 3
+NETS = Nets(3, (KNOTS,))
+ALL_SPANS = in_blocks([np.indices((4, 4, 4)).reshape(3, -1).T])
 
 
 def gauss_mean(volume, density, n_gauss=3):
@@ -45,7 +49,7 @@ def wavy_control(amplitude, seed=0):
 
 
 def as_volume(control):
-    return BSplineVolume((3,) * 3, KNOTS, np.moveaxis(control, 0, -1))
+    return BSplineVolume((3,) * 3, KNOTS, np.moveaxis(control.reshape(3, 7, 7, 7), 0, -1))
 
 
 def surface_fit():
@@ -57,21 +61,22 @@ def surface_fit():
         vertex_quadrics(vertices, faces, TANGENTIAL),
         vertex_weights(vertices, faces, len(vertices)),
     )
-    return SurfaceFit(SlidingParameters(KNOTS, 3, 0.5 + project_radially(centred), faces), vertices, quadrics, weights)
+    places = SlidingParameters(NETS, 0.5 + project_radially(centred), triangles=faces)
+    return SurfaceFit(places, vertices, quadrics, weights)
 
 
 def penalised_energy():
-    energy = SplineEnergy(KNOTS, surface_fit(), Weights())
-    energy.distortion.penalty = RAMP[0]
+    energy = SplineEnergy(NETS, surface_fit(), Weights())
+    energy.distortion.terms[0].penalty = RAMP[0]
     energy._round = RoundWeights(RAMP[0], Weights.surface)
     return energy
 
 
 @pytest.mark.parametrize("amplitude", [0.02, 0.12])
 def test_gradients_against_finite_differences(amplitude):
-    control = wavy_control(amplitude)
+    control = wavy_control(amplitude).reshape(3, -1)
     energy = penalised_energy()
-    energy.determinants.activate(np.indices((4, 4, 4)).reshape(3, -1).T)
+    energy.determinants.activate(ALL_SPANS)
     _, inner, _ = energy.volume_part(control)
     _, outer = energy.surface_part(control)
     for seed in range(3):
@@ -88,7 +93,7 @@ def test_gradients_against_finite_differences(amplitude):
 
 def test_newton_direction_leads_down():
     energy = penalised_energy()
-    control = wavy_control(0.1, seed=3)
+    control = wavy_control(0.1, seed=3).reshape(3, -1)
     value, gradient, _ = energy.volume_part(control)
     outer, pulled = energy.surface_part(control)
     direction = energy.newton_direction(control, -(gradient + pulled))
@@ -97,12 +102,12 @@ def test_newton_direction_leads_down():
 
 
 def test_the_number_of_threads_changes_no_bit(monkeypatch):
-    control, found = wavy_control(0.1, seed=3), []
+    control, found = wavy_control(0.1, seed=3).reshape(3, -1), []
     monkeypatch.delenv("NUMBA_NUM_THREADS", raising=False)
     for threads in ("1", "3"):
         monkeypatch.setenv("OMP_NUM_THREADS", threads)
         energy = penalised_energy()
-        energy.determinants.activate(np.indices((4, 4, 4)).reshape(3, -1).T)  # two pieces of work
+        energy.determinants.activate(ALL_SPANS)  # two pieces of work
         energy.slide(control)
         value, gradient, _ = energy.volume_part(control)
         outer, pulled = energy.surface_part(control)
@@ -117,7 +122,7 @@ def optimise_from(control, schedule=SCHEDULE, config=CONFIG, fit=None, **options
     """Return the map, the course of the rounds, and the columns of their history."""
     history = History()
     found, course = optimize(
-        SplineMap(3, KNOTS, control), fit or surface_fit(), config, schedule, history=history, **options
+        SplineMap.on_cube(3, KNOTS, control), fit or surface_fit(), config, schedule, history=history, **options
     )
     return found, course, history.arrays()
 
@@ -131,7 +136,7 @@ def no_descent(monkeypatch):
 def test_an_easy_shape_ends_certified_with_less_distortion():
     start = wavy_control(0.08)
     fit = surface_fit()
-    before = np.linalg.norm(fit.residuals(start), axis=1).mean()
+    before = np.linalg.norm(fit.residuals(start.reshape(3, -1)), axis=1).mean()
     found, course, columns = optimise_from(start, fit=fit)
     assert found.certificate.verdict == "certified"
     volume = as_volume(found.spline.control)
@@ -157,12 +162,15 @@ def test_smoothing_bends_least_next_to_the_spans_and_moves_nothing_else():
     knots = (open_uniform_knots(14, 3),) * 3
     row = greville(knots[0], 3)
     control = np.stack(np.meshgrid(row, row, row, indexing="ij"))
+    around = np.array([[0, 4, 4, 4]])
     folded = control.copy()
     folded[:, 6, 6, 6] += 0.4
-    energy = SplineEnergy(knots, surface_fit(), Weights())
-    assert np.allclose(energy.smoothed(folded, np.array([[4, 4, 4]])), control, atol=1e-7)  # a cube bends nowhere
+    nets = Nets(3, (knots,))
+    energy = SplineEnergy(nets, surface_fit().on_nets(nets), Weights())
+    smoothed = energy.smoothed(folded.reshape(3, -1), around).reshape(folded.shape)
+    assert np.allclose(smoothed, control, atol=1e-7)  # a cube bends nowhere
     folded[:, 10, 6, 6] += 0.4  # spans 3 to 5 need the points 3 to 8
-    smoothed = energy.smoothed(folded, np.array([[4, 4, 4]]))
+    smoothed = energy.smoothed(folded.reshape(3, -1), around).reshape(folded.shape)
     moved = np.argwhere((smoothed != folded).any(axis=0))
     assert moved.min() == 3 and moved.max() == 8 and len(moved) == 6**3
 
@@ -225,12 +233,12 @@ def test_what_was_certified_is_the_result_where_the_polish_folds_more(monkeypatc
         rounds.append(1)
         folded = start.copy()
         folded[0, 1 : len(rounds), 3, 3] += 2.0
-        return folded
+        return folded.reshape(3, -1)
 
     monkeypatch.setattr("parameterize.optimization.rounds.descend", fold_more)
     monkeypatch.setattr("parameterize.optimization.phases._MENDINGS", 0)
     fit = surface_fit()
     fit.give_way(np.full(len(fit.points), 1e-6))  # so that the polish has something to take back
     found, course, _ = optimise_from(start, replace(SCHEDULE, rounds=12), fit=fit)
-    assert found.certificate.verdict == "certified" and np.array_equal(found.spline.control, start)
+    assert found.certificate.verdict == "certified" and np.array_equal(found.spline.control, start.reshape(3, -1))
     assert course.ending is Reason.FOLDS_AGAIN and course.rounds == {"shape": 1, "polish": 2}

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 from shapes import ball, rounded_cube
-from wavy import DEGREE, KNOTS, as_volume, on_the_cube, wavy_control
+from wavy import NETS, as_volume, on_the_cube, wavy_control
 
 from iga_nn.samples import sample
 from parameterize.optimization.sliding import SlidingParameters
@@ -15,7 +15,7 @@ def make_fit(points, parameters, tangential=0.02):
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     quadrics = normals[:, :, None] * normals[:, None, :] + tangential * np.eye(3)
     weights = rng.uniform(0.5, 1.5, len(points))
-    places = SlidingParameters(KNOTS, DEGREE, parameters, np.array([[0, 1, 2]]))
+    places = SlidingParameters(NETS, parameters, triangles=np.array([[0, 1, 2]]))
     weights /= weights.sum()
     return SurfaceFit(places, points, quadrics, weights), quadrics * weights[:, None, None]
 

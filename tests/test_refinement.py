@@ -20,6 +20,7 @@ from parameterize.progress import History, ignore
 from parameterize.quality.two_sided import two_sided
 from parameterize.refinement import refine
 from parameterize.spline.bspline import greville, open_uniform_knots
+from parameterize.spline.nets import Nets
 from parameterize.spline.spline_map import SplineMap
 from parameterize.surface.geometry import vertex_quadrics, vertex_weights
 
@@ -33,7 +34,7 @@ def surface_fit():
     """A rounded cube, slightly turned, whose parameters are the radial projection."""
     points, faces = subdivide_finely(*rounded_cube(OWN, power=4.0), CONFIG.longest_edge / 4.0, 9 * OWN)
     vertices = turned(points)
-    places = SlidingParameters(KNOTS, 3, 0.5 + project_radially(points - 0.5), faces)
+    places = SlidingParameters(Nets(3, (KNOTS,)), 0.5 + project_radially(points - 0.5), triangles=faces)
     quadrics = vertex_quadrics(vertices, faces, TANGENTIAL)
     return SurfaceFit(places, vertices, quadrics, vertex_weights(vertices, faces, OWN))
 
@@ -51,7 +52,7 @@ def first():
     """A certified map, and its surface data."""
     fit, row = surface_fit(), greville(KNOTS[0], 3)
     control = np.stack(np.meshgrid(row, row, row, indexing="ij"))
-    found, _ = optimize(SplineMap(3, KNOTS, control), fit, CONFIG, SCHEDULE, history=History())
+    found, _ = optimize(SplineMap.on_cube(3, KNOTS, control), fit, CONFIG, SCHEDULE, history=History())
     assert not any(found.faults)
     return found, fit
 
@@ -91,7 +92,7 @@ def test_knots_are_inserted_until_the_tolerance_is_met(first, once):
     assert told.stopped == "tolerance met" and len(told.levels) > 1
     assert distance(found, fit) == told.levels[-1].distance <= options["tolerance"]
     assert not any(found.faults)
-    assert tuple(found.spline.control.shape[1:]) == told.levels[-1].control_points > (6, 6, 6)
+    assert found.spline.volume.shape == told.levels[-1].control_points > (6, 6, 6)
     assert told.levels[0].rounds == {} and sum(told.levels[1].rounds.values()) > 0
     assert told.levels[1].seconds.keys() == told.levels[1].rounds.keys() and told.levels[1].ending
     for row in fit.places.knots:
@@ -101,14 +102,14 @@ def test_knots_are_inserted_until_the_tolerance_is_met(first, once):
 def test_no_direction_gets_more_than_the_limit(first):
     found, fit, told = refined(first, tolerance=1e-9, max_control_points=7)
     assert told.stopped == "limit reached"
-    assert max(told.levels[-1].control_points) == 7 == max(found.spline.control.shape[1:])
+    assert max(told.levels[-1].control_points) == 7 == max(found.spline.volume.shape)
     assert not any(found.faults) and distance(found, fit) < distance(*first)
 
 
 def test_the_last_certified_map_is_kept_where_a_finer_one_is_not(first, monkeypatch, caplog):
     def folded(start, *args, **options):
         pressed = start.control.copy()
-        pressed[:, 0, 0, 0] += 0.5
+        pressed[:, 0] += 0.5  # at a corner
         return Optimized.of(start.with_control(pressed)), Course({}, {}, Reason.STALLED)
 
     monkeypatch.setattr(refinement, "optimize", folded)
@@ -123,8 +124,8 @@ def test_the_last_certified_map_is_kept_where_a_finer_one_is_not(first, monkeypa
 def test_spans_that_are_not_proved_are_halved_first(first, monkeypatch):
     """A fold is pressed into one corner: what lies there is halved, and nothing else."""
     control, seen = first[0].spline.control.copy(), []
-    control[:, 0, 0, 0] += 0.5
-    found = Optimized.of(SplineMap(3, KNOTS, control))
+    control[:, 0] += 0.5  # at a corner
+    found = Optimized.of(first[0].spline.with_control(control))
     assert set(map(tuple, found.certificate.unproved)) == {(0, 0, 0)}
 
     def caught(start, *args, **options):
@@ -166,7 +167,7 @@ def test_weights_that_gave_way_are_carried_over(first):
     fit = surface_fit()
     fit.give_way(np.linspace(0.1, 1.0, len(fit.points)))
     finer = tuple(np.sort(np.append(row, 0.1)) for row in KNOTS)
-    other = fit.on_knots(finer)
+    other = fit.on_nets(Nets(3, (finer,)))
     assert np.array_equal(other.yielding, fit.yielding) and np.array_equal(other.weights, fit.weights)
     assert np.array_equal(other.places.parameters, fit.places.parameters)
     assert other.places.knots == finer

@@ -44,6 +44,8 @@ class MapOptions(SurfaceOptions):
         device: where the network is trained; "auto" takes CUDA where it is available.
         control_points: number of control points per direction; "auto" starts with 30 and adds more where the distance
             is large, for each direction apart, until it meets the tolerance or max_control_points is reached.
+        blocks: 1 for one cube, a larger number for at most so many blocks along the skeleton, or "auto": blocks for a
+            body with handles or limbs, one cube for the others.
         corners: JSON file with a list of eight corners, in the order (0,0,0), (0,0,1), (0,1,0), ..., (1,1,1) of the
             cube's: points of three coordinates in the surface's units, or vertex numbers counted from 0; or an object
             {"XYZ": [...]} with eight points in X, Y, Z, scaled to volume 1 about the middle of the bounding box.
@@ -63,6 +65,7 @@ class MapOptions(SurfaceOptions):
     seed: int = 0
     device: Literal["auto", "cpu", "cuda"] = "auto"
     control_points: int | Literal["auto"] = 30
+    blocks: int | Literal["auto"] = "auto"
     corners: Path | None = None
     resume: bool = False
     steps_factor: float = 1.0
@@ -77,6 +80,7 @@ class MapOptions(SurfaceOptions):
             raise InputError(f"seed {self.seed}: must not be negative")
         with input_errors():
             config = preset(self.preset).scaled(self.steps_factor)
+            config = config.with_blocks(None if self.blocks == "auto" else self.blocks)
             if self.control_points == "auto":
                 return config.refined(self.tolerance, self.max_control_points)
             for name in ("tolerance", "max_control_points"):

@@ -23,8 +23,11 @@ def face_number(axis: Any, side: Any) -> Any:
 
 
 def axis_and_side(faces: Any) -> tuple[Any, Any]:
-    """Return the constant axis and the side, 0 or 1, of face numbers, which are integers, arrays or tensors."""
-    return faces // 2, faces % 2
+    """Return the constant axis and the side, 0 or 1, of face numbers, which are integers, arrays or tensors.
+
+    A face of a body of blocks has the number 6 * block + face.
+    """
+    return faces % 6 // 2, faces % 2
 
 
 def tangent_axes(axis: Any) -> tuple[Any, Any]:

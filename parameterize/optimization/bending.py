@@ -12,6 +12,8 @@ from numpy.typing import DTypeLike
 
 from ..arrays import Array, Floats, Knots
 from ..spline.bspline import collocation, gauss_points
+from ..spline.nets import Nets
+from .blockwise import Blockwise, side_by_side
 from .operators import PiecewiseOperator
 from .tensor_product import Band, apply_band, band
 from .term import RoundWeights
@@ -50,8 +52,8 @@ def bending_operator(matrices: Grams, weight: float, dtype: DTypeLike = np.float
     return PiecewiseOperator([partial(bend, component) for component in range(3)], lambda parts, _: np.stack(parts))
 
 
-class Fairness:
-    """Compute the term weight * int |Hessian F|^2, which is quadratic in the control points.
+class BlockFairness:
+    """Compute the term weight * int |Hessian F|^2 over a block, which is quadratic in the control points.
 
     bend: the second derivative of the term, in double precision. mass: the three matrices (n, n) of the integrals of
     products of basis functions.
@@ -78,6 +80,17 @@ class Fairness:
     def with_stiffness(self) -> tuple[Array, ...]:
         """Return for each direction twice the stiffness matrix plus twice the weighted bending matrix, each (n, n)."""
         return tuple(2.0 * k + 2.0 * self._weight * h for k, h in zip(self._slope, self._curve, strict=True))
+
+
+class Fairness(Blockwise[BlockFairness]):
+    """Compute the fairness of all blocks; knots: of each block, in the units of the distortion.
+
+    bend: the second derivative of the term, in double precision.
+    """
+
+    def __init__(self, nets: Nets, knots: tuple[Knots, ...], weight: float) -> None:
+        super().__init__(nets, [BlockFairness(rows, nets.degree, weight) for rows in knots])
+        self.bend = side_by_side(nets, [term.bend for term in self.terms])
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]

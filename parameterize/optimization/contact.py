@@ -14,6 +14,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..arrays import Array, Floats, IntArray
+from ..spline.nets import Nets
 from ..spline.sampled_boundary import SampledBoundary
 from ..spline.spline_map import SplineMap
 from ..surface.geometry import vertex_normals
@@ -23,7 +24,8 @@ from .term import RoundWeights
 
 _GAP = 1e-3  # between sheets, in a domain of volume 1: the check of the boundary proves such a gap
 _WEIGHT = 10.0  # times that of the distance from the surface, whose data hold the sheets where they are
-_SAMPLES = 110  # a direction and cube face
+_SAMPLES = 110  # a direction and face of one cube
+_LEAST_SAMPLES = 16  # the same, in a body of many blocks
 _CANDIDATES = 256  # nearest samples among which one that faces the opposite way is looked for
 _CHUNK = 4096  # samples at a time, which take some 40 MB
 _REACH = 0.05  # distance from a contact, in a domain of volume 1, within which a round's steps look for others
@@ -35,7 +37,7 @@ class ContactPenalty:
     """Compute the mean over the boundary's samples of (gap - (F(p) - F(q)) . n)_+^2, with k samples p in contact.
 
     first, second: the rows that yield F(p) and F(q). normals: (k, 3), the outward normals of the boundary at q. share:
-    the weight of one sample in the mean. spans: (2 k, 3), the spans of p and q. near: (m,), the samples that may come
+    the weight of one sample in the mean. spans: (2 k, 4), the spans of p and q. near: (m,), the samples that may come
     into contact during a few more Newton steps.
     """
 
@@ -52,7 +54,7 @@ class ContactPenalty:
         return _WEIGHT * weights.surface
 
     def energy_and_gradient(self, control: Array) -> tuple[float, Array]:
-        """Return the penalty at control points (3, n_u, n_v, n_w), and its gradient of the same shape."""
+        """Return the penalty at control points (3, n), and its gradient of the same shape."""
         shortfall = np.maximum(self.gap - self.distances(control), 0.0)
         return self.share * float((shortfall**2).sum()), self._pull(-2.0 * self.share * shortfall, control)
 
@@ -82,7 +84,7 @@ def contact_penalty(spline: SplineMap, gap: float = _GAP, near: IntArray | None 
     gap: the least distance between two sheets, in units of the map's control points. near: the only samples to be
     examined, from a penalty a few steps before; the examination of all samples takes longer than a Newton step.
     """
-    boundary = SampledBoundary.on(spline.volume, *[np.linspace(0.0, 1.0, _SAMPLES)] * 3)
+    boundary = SampledBoundary.on(spline.body, *[np.linspace(0.0, 1.0, _samples_a_direction(spline.nets))] * 3)
     normals = vertex_normals(boundary.points, boundary.triangles)
     asked = np.arange(len(boundary.points)) if near is None else near
     touching = asked
@@ -93,8 +95,10 @@ def contact_penalty(spline: SplineMap, gap: float = _GAP, near: IntArray | None 
         touching = asked[winding.winding_number(outside, _ACCURACY) > 0.5]
     near = _around(boundary.points, touching) if near is None else near
     touching, facing = _facing_samples(boundary.points, normals, touching)
-    samples = (boundary.parameters[chosen] for chosen in (touching, facing))
-    first, second = (SlidingParameters(spline.knots, spline.degree, parameters) for parameters in samples)
+    first, second = (
+        SlidingParameters(spline.nets, boundary.parameters[chosen], boundary.sample_faces[chosen])
+        for chosen in (touching, facing)
+    )
     return ContactPenalty(
         first.rows,
         second.rows,
@@ -104,6 +108,11 @@ def contact_penalty(spline: SplineMap, gap: float = _GAP, near: IntArray | None 
         np.concatenate([first.spans(), second.spans()]),
         near,
     )
+
+
+def _samples_a_direction(nets: Nets) -> int:
+    """Return the number of samples a direction and face, in all about as many as the faces of one cube have."""
+    return max(_LEAST_SAMPLES, round(_SAMPLES * (6.0 / np.count_nonzero(nets.exposed)) ** 0.5))
 
 
 def _around(points: Array, touching: IntArray) -> IntArray:

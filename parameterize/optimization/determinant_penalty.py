@@ -17,9 +17,11 @@ import numpy as np
 from ..arrays import Array, Floats, IntArray, Knots, Mask
 from ..spline.bernstein import add_products, binomials, cross_products, extraction
 from ..spline.bspline import breakpoints
+from ..spline.nets import Nets
 from ..threads import in_parallel
+from .blockwise import Blockwise
 from .operators import PiecewiseOperator
-from .spans import with_neighbours
+from .spans import numbers, with_neighbours
 from .term import RoundWeights
 
 MIN_COEFFICIENT = 0.1  # a Bernstein coefficient of det J below this is penalised on active spans; mean det J is 1
@@ -63,15 +65,14 @@ class _Rows:
     starts: IntArray
 
 
-class DeterminantPenalty:
-    """Compute the mean over all spans of weight * (floor - coefficient)_+^2, for the Bernstein coefficients of det J.
+class BlockDeterminants:
+    """Compute a block's part of the mean over all spans of weight * (floor - coefficient)_+^2.
 
-    weights: (n_u, n_v, n_w), the weights of the spans, 0 at first; a span of positive weight is active. knots: the
-    knots of three directions with the same degree p. floor: in units of det J. Where the floor is lowered by a share,
-    the weight grows by the inverse of the squared share.
+    knots: the knots of three directions with the same degree p, in units in which the mean of det J is near 1. count:
+    the number of spans of all blocks. floor: in units of det J.
     """
 
-    def __init__(self, knots: Knots, degree: int, floor: float = MIN_COEFFICIENT) -> None:
+    def __init__(self, knots: Knots, degree: int, count: int, floor: float) -> None:
         self.floor = floor
         self._extractions = [extraction(k, degree) for k in knots]
         self._widths = [np.diff(breakpoints(k)) for k in knots]
@@ -80,37 +81,16 @@ class DeterminantPenalty:
             np.einsum("i,j,k->ijk", *(lowered if d == axis else whole for d in range(3))) for axis in range(3)
         ]
         self._unscale = np.einsum("i,j,k->ijk", *(1.0 / binomials(3 * degree - 1),) * 3)
-        self._share = 1.0 / (self._unscale.size * np.prod([len(w) for w in self._widths]))
-        self._lowered = np.ones([len(w) for w in self._widths])
-        self.weigh(np.zeros_like(self._lowered))
+        self._share = 1.0 / (self._unscale.size * count)
+        self._pieces: list[_Spans] = []
 
-    def activate(self, spans: IntArray) -> None:
-        """Raise the weights of spans (k, 3) to at least 1."""
-        weights = self.weights.copy()
-        weights[tuple(spans.T)] = np.maximum(weights[tuple(spans.T)], 1.0)
-        self.weigh(weights)
-
-    def stiffen(self, spans: IntArray, factor: float, most: float) -> None:
-        """Multiply the weights of spans (k, 3) and of their neighbours by a factor, from 1 on and at most to `most`.
-
-        The neighbours are included because otherwise a fold would move into the next span.
-        """
-        grown = np.minimum(factor * np.maximum(self.weights, 1.0), most)
-        self.weigh(np.where(with_neighbours(spans, self.weights.shape), np.maximum(grown, self.weights), self.weights))
-
-    def lower_floors(self, shares: Array) -> None:
-        """Lower the floors of all spans to shares (n_u, n_v, n_w) of the usual floor."""
-        self._lowered = shares
-        self.weigh(self.weights)
-
-    def weigh(self, weights: Array) -> None:
-        """Set the weights of all spans, (n_u, n_v, n_w)."""
-        self.weights = weights
+    def weigh(self, weights: Array, lowered_floors: Array) -> None:
+        """Set the weights of all spans, and the shares to which their floors are lowered, (n_u, n_v, n_w) each."""
         active = np.argwhere(weights > 0.0)
         first = np.stack([e[0][s] for e, s in zip(self._extractions, active.T, strict=True)], axis=1)
         bezier = np.stack([e[1][s] for e, s in zip(self._extractions, active.T, strict=True)], axis=1)
         volumes = np.prod([w[s] for w, s in zip(self._widths, active.T, strict=True)], axis=0)
-        lowered = self._lowered[tuple(active.T)]
+        lowered = lowered_floors[tuple(active.T)]
         floors, shares = self.floor * lowered, self._share * weights[tuple(active.T)] / lowered**2
         blocks = [slice(start, start + _BLOCK) for start in range(0, len(first), _BLOCK)]
         back = np.ascontiguousarray(np.swapaxes(bezier, 2, 3))
@@ -173,6 +153,47 @@ class DeterminantPenalty:
         starts = np.concatenate([[0], np.cumsum(counts[counts > 0])])
         shares = spans.shares[place[:, 0]].astype(dtype)
         return _Rows(spans.some(counts > 0), short[tuple(place.T)], shares, rows, starts)
+
+
+class DeterminantPenalty(Blockwise[BlockDeterminants]):
+    """Compute the mean over all spans of weight * (floor - coefficient)_+^2, for the Bernstein coefficients of det J.
+
+    weights: (m,), the weights of all spans, 0 at first; a span of positive weight is active. knots: of each block, in
+    units in which the mean of det J is near 1. floor: in units of det J. Where the floor is lowered by a share, the
+    weight grows by the inverse of the squared share.
+    """
+
+    def __init__(self, nets: Nets, knots: tuple[Knots, ...], floor: float = MIN_COEFFICIENT) -> None:
+        self.floor, count = floor, int(nets.first_spans[-1])
+        super().__init__(nets, [BlockDeterminants(rows, nets.degree, count, floor) for rows in knots])
+        self._lowered = np.ones(count)
+        self.weigh(np.zeros(count))
+
+    def activate(self, spans: IntArray) -> None:
+        """Raise the weights of spans (k, 4) to at least 1."""
+        weights, chosen = self.weights.copy(), numbers(spans, self.nets)
+        weights[chosen] = np.maximum(weights[chosen], 1.0)
+        self.weigh(weights)
+
+    def stiffen(self, spans: IntArray, factor: float, most: float) -> None:
+        """Multiply the weights of spans (k, 4) and of their neighbours by a factor, from 1 on and at most to `most`.
+
+        The neighbours are included because otherwise a fold would move into the next span.
+        """
+        grown = np.minimum(factor * np.maximum(self.weights, 1.0), most)
+        self.weigh(np.where(with_neighbours(spans, self.nets), np.maximum(grown, self.weights), self.weights))
+
+    def lower_floors(self, shares: Array) -> None:
+        """Lower the floors of all spans to shares (m,) of the usual floor."""
+        self._lowered = shares
+        self.weigh(self.weights)
+
+    def weigh(self, weights: Array) -> None:
+        """Set the weights of all spans, (m,)."""
+        self.weights = weights
+        for block, (term, spans) in enumerate(zip(self.terms, self.nets.spans, strict=True)):
+            own = slice(self.nets.first_spans[block], self.nets.first_spans[block + 1])
+            term.weigh(weights[own].reshape(spans), self._lowered[own].reshape(spans))
 
 
 def _product(found: _Rows, x: Floats) -> tuple[IntArray, Floats]:

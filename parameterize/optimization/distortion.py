@@ -1,5 +1,6 @@
 """Computes the distortion of a spline map, with a penalty on det J at the quadrature points."""
 
+import math
 from collections.abc import Callable
 
 import numba
@@ -8,7 +9,9 @@ from scipy.ndimage import uniform_filter
 
 from ..arrays import Array, Floats, Knots
 from ..quality.rotations import closest_rotations
+from ..spline.nets import Nets
 from ..threads import in_parallel
+from .blockwise import Blockwise
 from .matrices import cofactors_and_determinants, dots, least_eigenvalues, squared_norms
 from .operators import PiecewiseOperator
 from .tensor_product import SYMMETRIC, GaussGrid
@@ -21,8 +24,8 @@ _GAUSS = 3, 1  # Gauss points a span and direction: on the first and last span, 
 _LEAST_DET = 0.03  # in the metric of the damping: below, it would hold F still
 
 
-class Distortion:
-    """Compute int a + s (a - l)_+^2 + w (alpha - det J)_+^2 over the cube, with a = |J - R|^2, R the closest rotation.
+class BlockDistortion:
+    """Compute int a + s (a - l)_+^2 + w (alpha - det J)_+^2 over a block, with a = |J - R|^2, R the closest rotation.
 
     The first term, a, is the ARAP energy of F; the second keeps the maximum of a small; the third prevents folds, as
     the paper's bijectivity term does. The integral is computed by Gauss quadrature. Where alpha is lowered by a share,
@@ -38,6 +41,7 @@ class Distortion:
         self.limit, self.penalty, self.damping, self.folded = ARAP_LIMIT, 0.0, 0.0, 0
         self._floors = np.full_like(self._grid.weights, _MIN_DET)  # alpha at the points
         self._short_weights = self._grid.weights  # of the squared shortfalls
+        self._size = math.prod(float(row[-1] - row[0]) for row in knots)
 
     def start_round(self, control: Array, penalty: float) -> None:
         """Set the weight of the penalty, and set the limit l in proportion to 1 + the mean distortion at `control`."""
@@ -47,7 +51,7 @@ class Distortion:
             jacobian = self._grid.jacobian(control, planes)
             return float(self._weights(planes) @ squared_norms(jacobian - closest_rotations(jacobian)))
 
-        self.limit = ARAP_LIMIT * (1.0 + sum(in_parallel(part, self._grid.planes())))
+        self.limit = ARAP_LIMIT * (1.0 + sum(in_parallel(part, self._grid.planes())) / self._size)
 
     def lower_floors(self, control: Array, least: float) -> Array:
         """Lower alpha where det J is small all around at `control`; return the shares (n_u, n_v, n_w) of the spans.
@@ -127,6 +131,33 @@ class Distortion:
 
     def _weights(self, planes: slice) -> Array:
         return self._grid.weights[planes].ravel()
+
+
+class Distortion(Blockwise[BlockDistortion]):
+    """Compute the distortion of all blocks; knots: of each block, in units in which the mean of det J is near 1."""
+
+    def __init__(self, nets: Nets, knots: tuple[Knots, ...]) -> None:
+        super().__init__(nets, [BlockDistortion(rows, nets.degree) for rows in knots])
+
+    @property
+    def folded(self) -> int:
+        """Return the number of quadrature points with det J <= 0 at the last evaluation of the energy."""
+        return sum(term.folded for term in self.terms)
+
+    def start_round(self, control: Array, penalty: float) -> None:
+        """Set the weight of the penalty and the limits of the distortion for control points (3, n)."""
+        for block, term in enumerate(self.terms):
+            term.start_round(self.nets.of_block(control, block), penalty)
+
+    def lower_floors(self, control: Array, least: float) -> Array:
+        """Lower the floors of det J where it is small all around at `control`; return the shares (m,) of all spans."""
+        parts = enumerate(self.terms)
+        return np.concatenate([term.lower_floors(self.nets.of_block(control, k), least).ravel() for k, term in parts])
+
+    def damp(self, damping: float) -> None:
+        """Set the damping of Newton's step."""
+        for term in self.terms:
+            term.damping = damping
 
 
 def _turning(rotation: Floats, jacobian: Floats) -> Floats:

@@ -1,4 +1,4 @@
-"""Draws F towards the surface at anchors, which are points on the 12 edges of the cube.
+"""Draws F towards the surface at anchors, which are points on the edges of the blocks' faces on the boundary.
 
 The edges of the cube may have no parameter of a vertex of the mesh. F keeps a small crease along these edges, and
 without anchors it could leave the surface there, most of all at the eight corners, and inflate the elements. Anchors
@@ -9,9 +9,10 @@ rounds they may move a little, because the boundary crosses itself beside corner
 
 import numpy as np
 
-from ..arrays import Array, Knots
-from ..cube.cube import CORNERS, EDGES
+from ..arrays import Array, IntArray
+from ..cube.cube import CORNERS, EDGES, face_number
 from ..spline.bspline import divided_spans
+from ..spline.nets import Nets
 from ..surface.nearest import nearest_on_mesh
 from .operators import PiecewiseOperator
 from .sliding import SlidingParameters
@@ -25,14 +26,29 @@ _NEAR_SHARE = 0.99  # of the anchors: with fewer near, they would hold F at anot
 _GIVEN_CORNER = 0.5  # weight, in all directions, of a corner that the user gives
 
 
-def edge_points(knots: Knots) -> Array:
-    """Return the corners of the cube, and the ends and the midpoints of the spans along its edges: (k, 3)."""
-    points = []
-    for i, j in EDGES:
-        direction = CORNERS[j] - CORNERS[i]
-        along = divided_spans(knots[int(direction.argmax())], _A_SPAN)
-        points.append(CORNERS[i] + along[:, None] * direction)
-    return np.unique(np.concatenate(points), axis=0)
+def edge_points(nets: Nets) -> tuple[Array, IntArray]:
+    """Return points (k, 3) on the edges of all faces that belong to the boundary, and these faces (k,).
+
+    The points are the corners, and the ends and the midpoints of the spans along the edges, once for each block.
+    """
+    points, faces = [], []
+    for block, knots in enumerate(nets.knots):
+        exposed = nets.exposed[6 * block : 6 * block + 6]
+        own = [np.empty((0, 3))]
+        for i, j in EDGES:
+            direction = CORNERS[j] - CORNERS[i]
+            if exposed[_faces_at(CORNERS[i], CORNERS[j])].any():
+                along = divided_spans(knots[int(direction.argmax())], _A_SPAN)
+                own.append(CORNERS[i] + along[:, None] * direction)
+        points.append(np.unique(np.concatenate(own), axis=0))
+        on_face = np.stack([points[-1][:, axis] == side for axis in range(3) for side in (0.0, 1.0)], axis=1)
+        faces.append(6 * block + (on_face & exposed).argmax(axis=1))
+    return np.concatenate(points), np.concatenate(faces)
+
+
+def _faces_at(first: Array, second: Array) -> list[int]:
+    """Return the numbers of the cube's two faces that meet in the edge between two corners."""
+    return [int(face_number(axis, first[axis])) for axis in range(3) if first[axis] == second[axis]]
 
 
 class EdgeAnchors:
@@ -40,9 +56,8 @@ class EdgeAnchors:
 
     def __init__(self, surface: SurfaceFit) -> None:
         self._surface = surface
-        knots, degree = surface.places.knots, surface.places.degree
-        points = edge_points(knots)
-        places = SlidingParameters(knots, degree, points)
+        points, faces = edge_points(surface.places.nets)
+        places = SlidingParameters(surface.places.nets, points, faces)
         self.fit = SurfaceFit(places, points, np.zeros((len(points), 3, 3)), np.full(len(points), 1.0 / len(points)))
 
     def weight(self, weights: RoundWeights) -> float:
@@ -50,7 +65,7 @@ class EdgeAnchors:
         return _WEIGHT * weights.surface
 
     def energy_and_gradient(self, control: Array) -> tuple[float, Array]:
-        """Return the mean squared distance at control points (3, n_u, n_v, n_w), and its gradient of the same shape."""
+        """Return the mean squared distance at control points (3, n), and its gradient of the same shape."""
         return self.fit.energy_and_gradient(control)
 
     def curvature(self, control: Array) -> PiecewiseOperator:
@@ -60,7 +75,7 @@ class EdgeAnchors:
     def near(self, control: Array) -> bool:
         """Return whether F is close enough to the surface along all edges for the nearest points to be right."""
         here, points, _ = self._nearest(control)
-        longest = _NEAR / (min(control.shape[1:]) - self.fit.places.degree)
+        longest = _NEAR / min(min(spans) for spans in self.fit.places.nets.spans)
         return float((np.linalg.norm(points - here, axis=1) < longest).mean()) >= _NEAR_SHARE
 
     def aim(self, control: Array, *, hold: bool) -> None:

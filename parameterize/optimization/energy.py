@@ -5,12 +5,14 @@ J; local-global methods hold the rotations fixed, which makes slides along the s
 matrix for the penalties. The boundary term is quadratic for fixed parameters.
 """
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 
 import numpy as np
 
-from ..arrays import Array, IntArray, Knots
+from ..arrays import Array, Floats, IntArray
 from ..conjugate_gradients import conjugate_gradients
+from ..quality.own_box import box_lengths
+from ..spline.nets import Nets
 from ..spline.spline_map import SplineMap
 from .bending import Fairness
 from .contact import ContactPenalty, contact_penalty
@@ -19,6 +21,7 @@ from .distortion import Distortion
 from .edge_attraction import EdgeAnchors
 from .normals import FacingPenalty, facing_penalty
 from .operators import weighted_sum
+from .reassignment import reassign
 from .spans import acting_on, with_neighbours
 from .surface_distance import SurfaceFit
 from .tensor_product import FastDiagonalization
@@ -39,18 +42,26 @@ class SplineEnergy:
     parameters.
     """
 
-    def __init__(self, knots: Knots, surface: SurfaceFit, weights: Weights) -> None:
-        degree = surface.places.degree
-        self.surface, self.degree = surface, degree
+    def __init__(self, nets: Nets, surface: SurfaceFit, weights: Weights) -> None:
+        self.surface, self.nets = surface, nets
         self.anchors = EdgeAnchors(surface)
-        self.distortion = Distortion(knots, degree)
-        self.determinants = DeterminantPenalty(knots, degree)
-        self.fairness = Fairness(knots, degree, weights.fairness)
-        self.inner: tuple[Term, ...] = (self.distortion, self.fairness, self.determinants)
         self._facing: FacingPenalty | None = None
         self._contact: ContactPenalty | None = None
-        self._knots, self._weights, self._grows = knots, weights, False
+        self._weights, self._grows = weights, False
         self._round = RoundWeights(0.0, weights.surface)
+        self.determinants = DeterminantPenalty(nets, nets.knots)
+        self._measure_in(np.ones((len(nets.knots), 3)))
+
+    def _measure_in(self, boxes: Array) -> None:
+        """Make the terms of the solid, in which each block has the side lengths `boxes` (blocks, 3)."""
+        nets = self.nets
+        knots = tuple((u * a, v * b, w * c) for (u, v, w), (a, b, c) in zip(nets.knots, boxes, strict=True))
+        self.surface.places.measure_in(boxes)
+        self.distortion, self.fairness = Distortion(nets, knots), Fairness(nets, knots, self._weights.fairness)
+        before = self.determinants.weights
+        self.determinants = DeterminantPenalty(nets, knots)
+        self.determinants.weigh(before)
+        self.inner: tuple[Term, ...] = (self.distortion, self.fairness, self.determinants)
         self._precondition = self._preconditioner()
 
     @property
@@ -59,12 +70,24 @@ class SplineEnergy:
         terms: tuple[Term | None, ...] = (self.surface, self.anchors, self._contact, self._facing)
         return tuple(term for term in terms if term is not None)
 
-    def _preconditioner(self) -> FastDiagonalization:
-        """Return the inverse of the second derivative at the identity, the surface's data spread over six faces."""
-        rough = self.fairness.with_stiffness()
-        for matrix in rough:
-            matrix[[0, -1], [0, -1]] += _PULL * self._round.surface / 6.0
-        return FastDiagonalization(rough, self.fairness.mass, dtype=np.float32)
+    def _preconditioner(self) -> Callable[[Floats], Floats]:
+        """Return the inverse of the second derivative at the identity, the surface's data spread over six faces.
+
+        Each block has its own inverse; the results are averaged at interfaces.
+        """
+        parts = []
+        for fairness in self.fairness.terms:
+            rough = fairness.with_stiffness()
+            for matrix in rough:
+                matrix[[0, -1], [0, -1]] += _PULL * self._round.surface / 6.0
+            parts.append(FastDiagonalization(rough, fairness.mass, dtype=np.float32))
+        nets = self.nets
+
+        def apply(residual: Floats) -> Floats:
+            found = [part(nets.of_block(residual, block)) for block, part in enumerate(parts)]
+            return nets.merged(nets.joined(found))
+
+        return apply
 
     def start_round(self, control: Array, penalty: float, share: float | None = None) -> None:
         """Set the weight of the penalty, the limit of the distortion and the floors of det J for the control points.
@@ -72,6 +95,9 @@ class SplineEnergy:
         share: the share of the weight of the surface's data while F grows into the solid; None where F does not grow.
         """
         self._round = RoundWeights(penalty, self._weights.surface * (1.0 if share is None else share))
+        if not self.nets.one_cube:
+            self._measure_in(box_lengths(SplineMap(self.nets, control).body))
+            reassign(self.surface, control)
         self.distortion.start_round(control, penalty)
         if self._weights.least_floor < 1.0:
             self.determinants.lower_floors(self.distortion.lower_floors(control, self._weights.least_floor))
@@ -92,26 +118,26 @@ class SplineEnergy:
     def watch_contact(self, control: Array) -> IntArray:
         """Penalise, from now on, contact between sheets of F's boundary at `control`; return the spans in contact.
 
-        The spans have the shape (k, 3).
+        The spans have the shape (k, 4).
         """
-        self._contact = contact_penalty(SplineMap(self.degree, self._knots, control))
+        self._contact = contact_penalty(SplineMap(self.nets, control))
         return self._contact.spans
 
     def slide(self, control: Array) -> None:
         """Let the surface's parameters slide towards their closest points, and penalise wrong normals of F there."""
-        places, points, longest = self.surface.places, self.surface.points, 0.5 / max(control.shape[1:])
+        places, points = self.surface.places, self.surface.points
         if self._grows:
-            places.slide(control, points, longest, keep_layout=True, reach=_REACH)
+            places.slide(control, points, keep_layout=True, reach=_REACH)
         else:
             for _ in range(_SLIDES):
-                places.slide(control, points, longest)
+                places.slide(control, points)
             places.relax(_RELAXATIONS)
         self.watch_facing(control)
         if self._contact is not None:
-            self._contact = contact_penalty(SplineMap(self.degree, self._knots, control), near=self._contact.near)
+            self._contact = contact_penalty(SplineMap(self.nets, control), near=self._contact.near)
 
     def give_way(self, spans: IntArray, factor: float) -> None:
-        """Multiply by `factor` the weights of the boundary data in and next to the spans (k, 3) of the map."""
+        """Multiply by `factor` the weights of the boundary data in and next to the spans (k, 4) of the map."""
         for fit in (self.surface, self.anchors.fit):
             fit.give_way(np.where(fit.places.near_spans(spans), factor, 1.0) * fit.yielding)
 
@@ -126,14 +152,14 @@ class SplineEnergy:
             fit.give_way(np.minimum(fit.yielding / factor, 1.0))
 
     def volume_part(self, control: Array) -> tuple[float, Array, int]:
-        """Return the energy of the solid's terms, its gradient (3, n_u, n_v, n_w), and the number of folded points.
+        """Return the energy of the solid's terms, its gradient (3, n), and the number of folded points.
 
         The points are those of the distortion's quadrature.
         """
         return *self._sum(self.inner, control), self.distortion.folded
 
     def surface_part(self, control: Array) -> tuple[float, Array]:
-        """Return the energy of the boundary's terms at the present parameters, and its gradient (3, n_u, n_v, n_w)."""
+        """Return the energy of the boundary's terms at the present parameters, and its gradient (3, n)."""
         return self._sum(self.outer, control)
 
     def _sum(self, terms: Iterable[Term], control: Array) -> tuple[float, Array]:
@@ -142,17 +168,17 @@ class SplineEnergy:
             weight, (value, slope) = term.weight(self._round), term.energy_and_gradient(control)
             energy += weight * value
             gradient += weight * slope
-        return energy, gradient
+        return energy, self.nets.merged(gradient)
 
     def smoothed(self, control: Array, spans: IntArray) -> Array:
-        """Return control points that bend F least in and next to the spans (k, 3); all other control points stay.
+        """Return control points that bend F least in and next to the spans (k, 4); all other control points stay.
 
         Unlike the penalty on det J, this does not depend on which side of a fold has the wrong orientation.
         """
-        free = acting_on(with_neighbours(spans, self.determinants.weights.shape), self.degree)
+        free = acting_on(with_neighbours(spans, self.nets), self.nets)
         moved = conjugate_gradients(
-            lambda x: self.fairness.bend(x) * free,
-            -(self.fairness.bend(control) * free),
+            lambda x: self.nets.merged(self.fairness.bend(x) * free),
+            -self.nets.merged(self.fairness.bend(control) * free),
             lambda x: x,
             tolerance=_SMOOTH_TOLERANCE,
             max_iterations=_SMOOTH_ITERATIONS,
@@ -161,10 +187,11 @@ class SplineEnergy:
 
     def newton_direction(self, control: Array, right: Array, damping: float = 0.0) -> Array:
         """Return an approximate solution of (Hessian + damping) x = right at `control`, with fixed parameters."""
-        self.distortion.damping = damping
+        self.distortion.damp(damping)
         terms = [(term.weight(self._round), term.curvature(control)) for term in (*self.inner, *self.outer)]
+        operator = weighted_sum(terms)
         direction = conjugate_gradients(
-            weighted_sum(terms),
+            lambda x: self.nets.merged(operator(x)),
             right.astype(np.float32),
             self._precondition,
             tolerance=_TOLERANCE,

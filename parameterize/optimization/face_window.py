@@ -1,31 +1,33 @@
-"""Evaluates the basis functions that are not zero at points of the cube's boundary, and F with its tangents there."""
+"""Evaluates the basis functions that are not zero at points on faces of blocks, and F with its tangents there."""
 
 from dataclasses import dataclass
 
 import numba
 import numpy as np
 
-from ..arrays import Array, IntArray, Knots, Mask
+from ..arrays import Array, IntArray, Mask
 from ..spline.bspline import basis_derivatives, breakpoints
+from ..spline.nets import Nets
 from ..threads import in_parallel
 from .operators import pieces
 
-Polynomials = tuple[IntArray, Array, IntArray, Array]
+Polynomials = tuple[IntArray, Array, IntArray, Array, IntArray]
 
 
-def polynomials_of(knots: Knots, degree: int) -> Polynomials:
+def polynomials_of(nets: Nets) -> Polynomials:
     """Return the basis functions that are not zero on a span as polynomials, which are cheap to evaluate.
 
-    The arrays hold the spans of all directions one after the other: the first span of each direction (4,), the first
-    parameter of each span (s,), its first basis function (s,), and the Taylor coefficients there (s, p + 1, p + 1),
-    power by power.
+    The arrays hold the spans of all directions of all blocks one after the other: the first span of each direction
+    (3 blocks + 1,), the first parameter of each span (s,), its first basis function (s,), the Taylor coefficients there
+    (s, p + 1, p + 1), power by power, and the number of each block's first control point (blocks + 1,).
     """
+    knots, degree = [row for rows in nets.knots for row in rows], nets.degree
     begins = [breakpoints(row)[:-1] for row in knots]
     found = [basis_derivatives(row, degree, begin, degree) for row, begin in zip(knots, begins, strict=True)]
     factorials = np.cumprod(np.maximum(np.arange(degree + 1), 1))
     coefficients = np.concatenate([derivatives.swapaxes(0, 1) for _, derivatives in found]) / factorials[:, None]
     starts = np.cumsum([0, *(len(begin) for begin in begins)])
-    return starts, np.concatenate(begins), np.concatenate([first for first, _ in found]), coefficients
+    return starts, np.concatenate(begins), np.concatenate([first for first, _ in found]), coefficients, nets.starts
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,14 +89,15 @@ def fill_window(
     in_b: Array,
 ) -> None:
     """Write row n of the three arrays of a FaceWindow."""
-    starts, _, first, _ = polynomials
-    axis, width = cube_faces[n] // 2, in_a.shape[2]
-    a, b = (axis + 1) % 3, (axis + 2) % 3
-    size_v, size_w = first[starts[2] - 1] + width, first[starts[3] - 1] + width
+    starts, _, first, _, offsets = polynomials
+    block, axis, width = cube_faces[n] // 6, cube_faces[n] % 6 // 2, in_a.shape[2]
+    a, b, own = (axis + 1) % 3, (axis + 2) % 3, 3 * block  # own: the block's first direction
+    size_v, size_w = first[starts[own + 2] - 1] + width, first[starts[own + 3] - 1] + width
     strides = (size_v * size_w, size_w, 1)
-    first_a = _fill_values(polynomials, a, parameters[n, a], n, in_a)
-    first_b = _fill_values(polynomials, b, parameters[n, b], n, in_b)
-    base = (first[starts[axis + 1] - 1] + width - 1) * strides[axis] if cube_faces[n] % 2 else 0
+    first_a = _fill_values(polynomials, own + a, parameters[n, a], n, in_a)
+    first_b = _fill_values(polynomials, own + b, parameters[n, b], n, in_b)
+    last = (first[starts[own + axis + 1] - 1] + width - 1) * strides[axis]
+    base = offsets[block] + (last if cube_faces[n] % 2 else 0)
     for i in range(width):
         for j in range(width):
             indices[n, i * width + j] = base + (first_a + i) * strides[a] + (first_b + j) * strides[b]
@@ -103,7 +106,7 @@ def fill_window(
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def _fill_values(polynomials: Polynomials, direction: int, x: float, n: int, out: Array) -> int:
     """Write row n of values and derivatives (N, 2, p + 1); return the number of the first function that is not zero."""
-    starts, begins, first, coefficients = polynomials
+    starts, begins, first, coefficients, _ = polynomials
     low, high = starts[direction], starts[direction + 1]
     while high - low > 1:
         middle = (low + high) // 2

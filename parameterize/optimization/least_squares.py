@@ -33,4 +33,4 @@ def fit_pairs(
     operator = weighted_sum([(1.0, rows.squared(weights[:, None, None] * np.eye(3))), (1.0, smooth)])
     right = rows.adjoint(weights[:, None] * points, np.zeros((3, *sizes)))
     found = conjugate_gradients(operator, right, precondition, tolerance=1e-5, max_iterations=300)
-    return SplineMap(degree, knots, found.x)
+    return SplineMap.on_cube(degree, knots, found.x)

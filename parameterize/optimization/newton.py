@@ -40,7 +40,7 @@ class Point:
 
     @property
     def gradient(self) -> Array:
-        """Return the gradient of the energy, (3, n_u, n_v, n_w)."""
+        """Return the gradient of the energy, (3, n)."""
         return self.inner[1] + self.outer[1]
 
 
@@ -123,7 +123,7 @@ class StoppingRule:
 
 
 def descend(energy: SplineEnergy, control: Array, rule: StoppingRule, after_step: Callable[[Point], None]) -> Array:
-    """Return the control points (3, n_u, n_v, n_w) after one round of steps; the surface's parameters slide with them.
+    """Return the control points (3, n) after one round of steps; the surface's parameters slide with them.
 
     after_step: a function that is called with the point after each step.
     """

@@ -38,7 +38,7 @@ class FacingPenalty:
         return weights.penalty
 
     def energy_and_gradient(self, control: Array) -> tuple[float, Array]:
-        """Return the penalty at control points (3, n_u, n_v, n_w), and its gradient of the same shape."""
+        """Return the penalty at control points (3, n), and its gradient of the same shape."""
         by_a, by_b, size = self._slopes(control)
         shortfall = np.maximum(self.floor - size, 0.0)
         gradient = self._pull(-2.0 * self.weights * shortfall, by_a, by_b, control)
@@ -76,10 +76,13 @@ def facing_penalty(fit: SurfaceFit, control: Array, floor: float = _FLOOR) -> Fa
     """
     window = fit.places.window
     _, tangent_a, tangent_b = window.derivatives(control)
-    outward = axis_and_side(fit.places.cube_faces)[1] == 1
+    _, side = axis_and_side(fit.places.cube_faces)
+    outward = side == 1
     normals = np.where(outward, 1.0, -1.0)[:, None] * fit.normals
-    low = np.einsum("nc,nc->n", np.cross(tangent_a, tangent_b), normals) < _MARGIN * floor
-    along_a, along_b = window.weights(1, 0), window.weights(0, 1)
+    lengths = fit.places.lengths
+    size = np.einsum("nc,nc->n", np.cross(tangent_a, tangent_b), normals) / (lengths[0] * lengths[1])
+    low = size < _MARGIN * floor
+    along_a, along_b = window.weights(1, 0) / lengths[0][:, None], window.weights(0, 1) / lengths[1][:, None]
     return FacingPenalty(
         (ControlRows(window.indices[low], along_a[low]), ControlRows(window.indices[low], along_b[low])),
         np.ascontiguousarray(normals[low].T),

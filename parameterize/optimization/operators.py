@@ -1,6 +1,6 @@
 """Defines linear operators on control points: sums of pieces of work, and sparse rows.
 
-Control points have the shape (3, n_u, n_v, n_w), component first. The pieces of work run on all threads; their results
+Control points have the shape (3, n), component first. The pieces of work run on all threads; their results
 are added in the order of the pieces, so that every number of threads gives the same bits.
 """
 
@@ -26,7 +26,7 @@ class PiecewiseOperator:
     add: Callable[[list[Any], Floats], Floats]
 
     def __call__(self, x: Floats) -> Floats:
-        """Return the operator applied to control points (3, n_u, n_v, n_w), in the same shape."""
+        """Return the operator applied to control points (3, n), in the same shape."""
         return self.add(in_parallel(lambda piece: piece(x), self.pieces), x)
 
 
@@ -61,7 +61,7 @@ class ControlRows:
         return ControlRows(self.columns, self.values.astype(np.float32))
 
     def __call__(self, control: Floats) -> Floats:
-        """Return the products (N, 3) of the rows and control points (3, n_u, n_v, n_w)."""
+        """Return the products (N, 3) of the rows and control points (3, n)."""
         field = control.reshape(3, -1)
         found = in_parallel(lambda rows: _times(self.columns[rows], self.values[rows], field), pieces(len(self.values)))
         return np.concatenate(found)

@@ -1,11 +1,14 @@
 """Holds a map that the rounds have found, with the results of its certificate."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
-from ..certificate.body import certify
+from ..arrays import IntArray
+from ..certificate.body import BodyCertificate, certify
 from ..certificate.boundary import check_boundary
 from ..certificate.jacobian import Certificate
 from ..spline.spline_map import SplineMap
+from .spans import in_blocks
 
 
 @dataclass(frozen=True, eq=False)
@@ -17,16 +20,22 @@ class Optimized:
     """
 
     spline: SplineMap
-    certificate: Certificate
+    certificate: Certificate | BodyCertificate
     injective: bool | None
 
     @classmethod
     def of(cls, spline: SplineMap) -> "Optimized":
         """Certify a map and, once it is certified, check its boundary."""
-        volume = spline.volume
-        certificate = certify(volume)
-        injective = check_boundary(volume).injective if certificate.verdict == "certified" else None
+        body = spline.body
+        certificate = certify(body)
+        injective = check_boundary(body).injective if certificate.verdict == "certified" else None
         return cls(spline, certificate, injective)
+
+    @cached_property
+    def unproved(self) -> IntArray:
+        """Return the spans (k, 4) of all blocks on which det J > 0 is not proved."""
+        found = self.certificate
+        return in_blocks([part.unproved for part in ((found,) if isinstance(found, Certificate) else found.patches)])
 
     @property
     def meets_itself(self) -> bool:
@@ -36,7 +45,7 @@ class Optimized:
     @property
     def faults(self) -> tuple[int, bool]:
         """Return the number of unproved spans, which counts first, and whether the boundary meets itself."""
-        return len(self.certificate.unproved), self.meets_itself
+        return len(self.unproved), self.meets_itself
 
     @property
     def rank(self) -> tuple[int, bool, bool]:

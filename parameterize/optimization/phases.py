@@ -100,12 +100,12 @@ class Unfold(Phase):
 
     def amended(self, state: State, found: Optimized) -> Optimized:
         """Smooth the map near spans that stay unproved; return the smoothed map where it has fewer unproved spans."""
-        unproved, patience = found.certificate.unproved, max(self.firm, state.halved + _SMOOTHING_ROUNDS)
+        unproved, patience = found.unproved, max(self.firm, state.halved + _SMOOTHING_ROUNDS)
         if state.number < patience or not 0 < len(unproved) <= _MOST_SMOOTHED:
             return found
         control = state.energy.smoothed(found.spline.control, unproved)
         smoothed = Optimized.of(found.spline.with_control(control))
-        _log.info("smoothed near %d spans: %d unproved", len(unproved), len(smoothed.certificate.unproved))
+        _log.info("smoothed near %d spans: %d unproved", len(unproved), len(smoothed.unproved))
         return smoothed if smoothed.faults < found.faults else found
 
     def done(self, state: State) -> Reason | None:
@@ -166,14 +166,14 @@ class Polish(Phase):
 
     def amended(self, state: State, found: Optimized) -> Optimized:
         """Move the spans that fold again back to their certified shape; return the given map where that fails."""
-        energy, folded, mended = state.energy, found.certificate.unproved, found
-        held = np.zeros(energy.determinants.weights.shape, dtype=bool)
+        energy, folded, mended = state.energy, found.unproved, found
+        held = np.zeros(len(energy.determinants.weights), dtype=bool)
         for _ in range(_MENDINGS):
-            unproved = mended.certificate.unproved
+            unproved = mended.unproved
             if not 0 < len(unproved) <= MOST_WATCHED:
                 break
-            held |= with_neighbours(unproved, held.shape)
-            back = acting_on(held, energy.degree)
+            held |= with_neighbours(unproved, energy.nets)
+            back = acting_on(held, energy.nets)
             control = np.where(back, state.best.spline.control, found.spline.control)
             mended = Optimized.of(found.spline.with_control(control))
         if mended is found or mended.rank > state.best.rank:

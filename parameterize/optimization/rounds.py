@@ -12,7 +12,6 @@ from ..arrays import IntArray
 from ..checkpoint import Checkpoints
 from ..config import SplineConfig
 from ..progress import History, Progress, ProgressCallback, ignore, timed
-from ..spline.bspline import breakpoints
 from ..spline.spline_map import SplineMap
 from ..threads import one_blas_thread
 from .endings import Course, Reason
@@ -49,14 +48,14 @@ def optimize(
     proved not to meet itself; or else the last certified map whose boundary is undecided; or else the last certified
     map; or else the map with the fewest unproved spans.
 
-    begun: the number of rounds on other knots that have led to `start`. watched: (k, 3), the spans that nearly fold in
+    begun: the number of rounds on other knots that have led to `start`. watched: (k, 4), the spans that nearly fold in
     `start`. A checkpoint is kept after every round. After the call, the surface's parameters belong to the returned
     map.
     """
     checkpoints = checkpoints or Checkpoints(None, {}, resume=False)
     with one_blas_thread():
-        energy = SplineEnergy(start.knots, surface, weights)
-        energy.determinants.activate(edge_spans(tuple(len(breakpoints(k)) - 1 for k in start.knots)))
+        energy = SplineEnergy(start.nets, surface, weights)
+        energy.determinants.activate(edge_spans(start.nets))
         if watched is not None:
             energy.determinants.activate(watched)
         first = Optimized.of(start)
@@ -86,7 +85,7 @@ def _round(state: State, phase: Phase, schedule: Schedule, report: "_StepReport"
     found = Optimized.of(state.spline.with_control(control))
     state.last_square = energy.surface.mean_square(control)
     found = phase.amended(state, found)
-    verdict, unproved = found.certificate.verdict, found.certificate.unproved
+    verdict, unproved = found.certificate.verdict, found.unproved
     meets = ", the boundary meets itself" if found.meets_itself else ""
     _log.info("round %d, %s: %s, %d spans unproved%s", number, phase.name, verdict, len(unproved), meets)
     state.spline, state.unproved_before, state.unproved = found.spline, state.unproved, len(unproved)

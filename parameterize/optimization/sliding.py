@@ -12,13 +12,15 @@ import numba
 import numpy as np
 
 from ..arrays import Array, IntArray, Knots, Mask
-from ..cube.cube import damped_solution, nearest_faces
+from ..cube.cube import axis_and_side, damped_solution, nearest_faces, tangent_axes
 from ..cube.flips import new_flips, unflip, untangle, untangle_whole
 from ..spline.bspline import breakpoints
+from ..spline.nets import Nets
 from ..threads import in_parallel
+from .adjacent_faces import Edges, next_faces
 from .face_window import FaceWindow, Polynomials, fill_tangents, fill_window, polynomials_of
 from .operators import ControlRows, pieces
-from .spans import with_neighbours
+from .spans import numbers, with_neighbours
 
 _DAMPING = 1e-6  # against parallel tangents
 _HALVINGS = 3
@@ -26,18 +28,42 @@ _NO_TRIANGLES = np.zeros((0, 3), dtype=np.int64)
 
 
 class SlidingParameters:
-    """Hold parameters (N, 3) on cube faces (N,), and the rows that yield F there.
+    """Hold parameters (N, 3) on faces (N,) of a block, and the rows that yield F there.
 
     The points to which parameters slide are not part of this class, because the samples of contact.py have none.
     SurfaceFit, a term of the energy, adds the points, their metrics and their weights.
 
-    triangles: (m, 3), between the points; with them `relax` and `slide` keep the layout on the cube one-to-one.
+    cube_faces: those of the parameters, 6 * block + face; by default the nearest ones of one cube. triangles: (m, 3),
+    between the points; on one cube, `relax` and `slide` keep the layout of these one-to-one. On a body of several
+    blocks parameters are assigned anew before each round (reassignment.py), and there is no layout to keep.
     """
 
-    def __init__(self, knots: Knots, degree: int, parameters: Array, triangles: IntArray = _NO_TRIANGLES) -> None:
-        self.knots, self.degree = knots, degree
-        self.triangles = triangles
-        self.place(parameters, nearest_faces(parameters))
+    def __init__(
+        self,
+        nets: Nets,
+        parameters: Array,
+        cube_faces: IntArray | None = None,
+        triangles: IntArray = _NO_TRIANGLES,
+    ) -> None:
+        self.nets, self.triangles = nets, triangles
+        self.measure_in(np.ones((len(nets.knots), 3)))
+        self.place(parameters, nearest_faces(parameters) if cube_faces is None else cube_faces)
+
+    @property
+    def knots(self) -> Knots:
+        """The knots of one cube."""
+        (knots,) = self.nets.knots
+        return knots
+
+    def measure_in(self, boxes: Array) -> None:
+        """Set the side lengths (blocks, 3) of the blocks, in which steps across their edges are measured."""
+        self.boxes = boxes
+
+    @property
+    def lengths(self) -> tuple[Array, Array]:
+        """Return the side lengths of the blocks along the two directions of each parameter's face, (N,) each."""
+        a, b = tangent_axes(axis_and_side(self.cube_faces)[0])
+        return self.boxes[self.blocks, a], self.boxes[self.blocks, b]
 
     def place(self, parameters: Array, cube_faces: IntArray) -> None:
         """Set the parameters (N, 3) and their cube faces (N,)."""
@@ -45,43 +71,51 @@ class SlidingParameters:
         for known in ("window", "rows"):
             self.__dict__.pop(known, None)
 
-    def on_knots(self, knots: Knots) -> "SlidingParameters":
-        """Return the same parameters for a spline with other knots."""
-        other = SlidingParameters(knots, self.degree, self.parameters, self.triangles)
-        other.place(self.parameters, self.cube_faces)
-        return other
+    def on_nets(self, nets: Nets) -> "SlidingParameters":
+        """Return the same parameters for blocks with other knots."""
+        return SlidingParameters(nets, self.parameters, self.cube_faces, self.triangles)
+
+    @property
+    def blocks(self) -> IntArray:
+        """Return the block of each parameter, (N,)."""
+        return np.asarray(self.cube_faces // 6)
 
     def values(self, control: Array) -> Array:
         """Return F at the parameters, (N, 3)."""
         return self.window.derivatives(control)[0]
 
     def spans(self) -> IntArray:
-        """Return the span of each parameter, (N, 3)."""
-        breaks = [breakpoints(k) for k in self.knots]
-        found = [np.searchsorted(b[1:-1], x, "right") for b, x in zip(breaks, self.parameters.T, strict=True)]
-        return np.stack(found, axis=1)
+        """Return the span of each parameter, with its block, (N, 4)."""
+        found = np.empty((len(self.parameters), 4), dtype=np.int64)
+        found[:, 0] = self.blocks
+        for block, knots in enumerate(self.nets.knots):
+            own = found[:, 0] == block
+            for axis, row in enumerate(knots):
+                inner = breakpoints(row)[1:-1]
+                found[own, 1 + axis] = np.searchsorted(inner, self.parameters[own, axis], "right")
+        return found
 
     def near_spans(self, spans: IntArray) -> Mask:
-        """Return the mask (N,) of the points with parameters in one of the spans (k, 3) or next to it."""
-        shape = tuple(len(breakpoints(k)) - 1 for k in self.knots)
-        return with_neighbours(spans, shape)[tuple(self.spans().T)]
+        """Return the mask (N,) of the points with parameters in one of the spans (k, 4) or next to it."""
+        return with_neighbours(spans, self.nets)[numbers(self.spans(), self.nets)]
 
-    def slide(
-        self, control: Array, points: Array, max_step: float, *, keep_layout: bool = False, reach: float = np.inf
-    ) -> None:
+    def slide(self, control: Array, points: Array, *, keep_layout: bool = False, reach: float = np.inf) -> None:
         """Move every parameter by one Gauss-Newton step to the place where F's boundary is closest to its point (N, 3).
 
-        A step across an edge of the cube continues on the next face; `max_step` is the longest step in the parameters.
+        A step across an edge continues on the next face of the boundary; the longest step in the parameters is half of
+        the inverse of the block's number of control points in its longest direction.
         Points whose distance would grow, and points farther away than `reach`, keep their parameters. With
         `keep_layout`, steps that would flip a triangle are shortened.
         """
         window, field = self.window, control.reshape(3, -1)
         polynomials, before = self._polynomials, (self.parameters, self.cube_faces)
+        longest = np.array([0.5 / max(shape) for shape in self.nets.shapes])
+        edges = next_faces(self.nets), self.boxes
 
         def part(rows: slice) -> tuple[Array, ...]:
             known = (window.indices[rows], window.in_a[rows], window.in_b[rows])
             at = (self.parameters[rows], self.cube_faces[rows])
-            return _slid(polynomials, *at, *known, field, points[rows], max_step, reach)
+            return _slid(polynomials, edges, *at, *known, field, points[rows], longest, reach)
 
         found = in_parallel(part, pieces(len(points)))
         goal, parameters, cube_faces, *arrays = (np.concatenate(parts) for parts in zip(*found, strict=True))
@@ -98,7 +132,8 @@ class SlidingParameters:
             if not blocked.any():
                 break
             share[blocked] *= 0.5
-            self.place(*fold_over_edges(parameters + share[:, None] * (goal - parameters), cube_faces))
+            folded = fold_over_edges(self.nets, parameters + share[:, None] * (goal - parameters), cube_faces)
+            self.place(*folded)
         self._keep(parameters, cube_faces, new_flips(parameters, self.parameters, self.triangles))
 
     def at_closest_points(self, control: Array, points: Array, slides: int, sweeps: int) -> "SlidingParameters":
@@ -107,17 +142,21 @@ class SlidingParameters:
         The parameters slide `slides` times; flipped triangles are relaxed in at most `sweeps` sweeps; then the
         parameters slide `slides` times again.
         """
-        other, longest = copy(self), 0.5 / max(control.shape[1:])
+        other = copy(self)
         for _ in range(slides):
-            other.slide(control, points, longest)
+            other.slide(control, points)
+        if not self.nets.one_cube:
+            return other
         other.unflip()
         other._move(untangle_whole(other.parameters, self.triangles, sweeps))
         for _ in range(slides):
-            other.slide(control, points, longest, keep_layout=True)
+            other.slide(control, points, keep_layout=True)
         return other
 
     def relax(self, sweeps: int) -> None:
         """Untangle flipped triangles in a few sweeps, so that flips of several slides do not accumulate."""
+        if not self.nets.one_cube:
+            return
         self._move(untangle(self.parameters, self.triangles, sweeps))
 
     def unflip(self) -> None:
@@ -145,7 +184,7 @@ class SlidingParameters:
 
     @cached_property
     def _polynomials(self) -> Polynomials:
-        return polynomials_of(self.knots, self.degree)
+        return polynomials_of(self.nets)
 
     @cached_property
     def rows(self) -> ControlRows:
@@ -156,6 +195,7 @@ class SlidingParameters:
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def _slid(
     polynomials: Polynomials,
+    edges: Edges,
     parameters: Array,
     cube_faces: IntArray,
     indices: IntArray,
@@ -163,7 +203,7 @@ def _slid(
     in_b: Array,
     control: Array,
     points: Array,
-    max_step: float,
+    max_steps: Array,
     reach: float,
 ) -> tuple[Array, Array, IntArray, IntArray, Array, Array]:
     """Compute the step of `SlidingParameters.slide` at points (N, 3) with a given FaceWindow.
@@ -184,15 +224,15 @@ def _slid(
             aa, bb, ab = aa + along_a * along_a, bb + along_b * along_b, ab + along_a * along_b
             ra, rb = ra + along_a * off, rb + along_b * off
         step_a, step_b = damped_solution(aa, bb, ab, ra, rb, _DAMPING)
-        share = min(1.0, max_step / max(np.sqrt(step_a**2 + step_b**2), 1e-300))
         face = cube_faces[n]
-        goal[n, (face // 2 + 1) % 3] -= share * step_a
-        goal[n, (face // 2 + 2) % 3] -= share * step_b
+        share = min(1.0, max_steps[face // 6] / max(np.sqrt(step_a**2 + step_b**2), 1e-300))
+        goal[n, (face % 6 // 2 + 1) % 3] -= share * step_a
+        goal[n, (face % 6 // 2 + 2) % 3] -= share * step_b
         if square > reach**2:
             continue
         for c in range(3):
             parameters[n, c] = goal[n, c]
-        _fold(parameters, cube_faces, n)
+        _fold(edges, parameters, cube_faces, n)
         fill_window(polynomials, parameters, cube_faces, n, indices, in_a, in_b)
         fill_tangents(indices, in_a, in_b, control, n, found)
         after = 0.0
@@ -204,33 +244,41 @@ def _slid(
     return goal, parameters, cube_faces, indices, in_a, in_b
 
 
-def fold_over_edges(parameters: Array, cube_faces: IntArray) -> tuple[Array, IntArray]:
-    """Return parameters and cube faces after steps that left a face continue on the neighbouring face.
+def fold_over_edges(nets: Nets, parameters: Array, cube_faces: IntArray) -> tuple[Array, IntArray]:
+    """Return parameters and faces after steps that left a face continue on the neighbouring face; all blocks are cubes.
 
     The part of a step beyond the edge points inwards on the neighbouring face.
     """
     parameters, cube_faces = parameters.copy(), cube_faces.copy()
-    _fold_all(parameters, cube_faces)
+    _fold_all((next_faces(nets), np.ones((len(nets.knots), 3))), parameters, cube_faces)
     return parameters, cube_faces
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def _fold_all(parameters: Array, cube_faces: IntArray) -> None:
+def _fold_all(edges: Edges, parameters: Array, cube_faces: IntArray) -> None:
     for n in range(len(parameters)):
-        _fold(parameters, cube_faces, n)
+        _fold(edges, parameters, cube_faces, n)
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def _fold(parameters: Array, cube_faces: IntArray, n: int) -> None:
+def _fold(edges: Edges, parameters: Array, cube_faces: IntArray, n: int) -> None:
     """Continue the step of point n on the neighbouring face, in place."""
-    constant, side = cube_faces[n] // 2, cube_faces[n] % 2
+    table, boxes = edges
+    face = cube_faces[n]
+    block, constant = face // 6, face % 6 // 2
     axis, overshoot = constant, 0.0
     for d in range(3):
-        outside = max(-parameters[n, d], parameters[n, d] - 1.0)
+        outside = boxes[block, d] * max(-parameters[n, d], parameters[n, d] - 1.0)
         if d != constant and outside > overshoot:
             axis, overshoot = d, outside
     if overshoot > 0.0:
-        parameters[n, constant] = 1.0 - overshoot if side == 1 else overshoot
-        cube_faces[n] = 2 * axis + int(parameters[n, axis] > 0.5)
+        other, inwards, side, reverse = table[face, axis, int(parameters[n, axis] > 0.5)]
+        along = parameters[n, 3 - constant - axis]
+        step = overshoot / boxes[other // 6, inwards]
+        across = other % 6 // 2
+        parameters[n, 3 - across - inwards] = 1.0 - along if reverse else along
+        parameters[n, across] = float(other % 2)
+        parameters[n, inwards] = 1.0 - step if side == 1 else step
+        cube_faces[n] = other
     for d in range(3):
         parameters[n, d] = min(max(parameters[n, d], 0.0), 1.0)

@@ -1,29 +1,77 @@
-"""Numbers the spans of a tensor-product spline: neighbours, the control points that act on spans, the cube's edges."""
+"""Numbers the spans of blocks: neighbours, the control points that act on spans, the spans at the blocks' edges.
+
+A span is given by its block and its place in the three directions, (k, 4). Masks hold all spans of all blocks, (m,).
+"""
+
+from functools import lru_cache
+from itertools import product
 
 import numpy as np
-from scipy.ndimage import binary_dilation
 
 from ..arrays import IntArray, Mask
+from ..spline.multipatch import shared_numbers
+from ..spline.nets import Nets
 
 
-def with_neighbours(spans: IntArray, n_spans: tuple[int, ...]) -> Mask:
-    """Return the mask (n_u, n_v, n_w) of the spans (k, 3) and of all spans that touch these."""
-    marked = np.zeros(n_spans, dtype=bool)
-    marked[tuple(spans.T)] = True
-    return np.asarray(binary_dilation(marked, np.ones((3, 3, 3), dtype=bool)))
+def in_blocks(spans: list[IntArray]) -> IntArray:
+    """Return spans with their blocks, (k, 4), from the spans (k, 3) of each block in order."""
+    return np.concatenate([np.insert(rows.reshape(-1, 3), 0, block, axis=1) for block, rows in enumerate(spans)])
 
 
-def acting_on(spans: Mask, degree: int) -> Mask:
-    """Return the mask (n_u, n_v, n_w) of the control points that act on marked spans.
-
-    The mask of the spans has `degree` fewer entries in each direction.
-    """
-    windows = np.lib.stride_tricks.sliding_window_view(np.pad(spans, degree), (degree + 1,) * 3)
-    return np.asarray(windows.any(axis=(3, 4, 5)))
+def numbers(spans: IntArray, nets: Nets) -> IntArray:
+    """Return the numbers (k,) of spans (k, 4) in a mask."""
+    counts = np.array(nets.spans)[spans[:, 0]]
+    inside = (spans[:, 1] * counts[:, 1] + spans[:, 2]) * counts[:, 2] + spans[:, 3]
+    return np.asarray(nets.first_spans[spans[:, 0]] + inside)
 
 
-def edge_spans(n_spans: tuple[int, ...]) -> IntArray:
-    """Return the spans (k, 3) that touch one of the cube's 12 edges."""
-    index = np.indices(n_spans).reshape(3, -1).T
-    at_side = (index == 0) | (index == np.array(n_spans) - 1)
-    return index[at_side.sum(axis=1) >= 2]
+def of_numbers(chosen: IntArray, nets: Nets) -> IntArray:
+    """Return the spans (k, 4) with these numbers (k,)."""
+    blocks = np.searchsorted(nets.first_spans, chosen, "right") - 1
+    inside = chosen - nets.first_spans[blocks]
+    counts = np.array(nets.spans)[blocks]
+    u, rest = np.divmod(inside, counts[:, 1] * counts[:, 2])
+    return np.stack([blocks, u, *np.divmod(rest, counts[:, 2])], axis=1)
+
+
+def with_neighbours(spans: IntArray, nets: Nets) -> Mask:
+    """Return the mask (m,) of the spans (k, 4) and of all spans that touch these, through interfaces too."""
+    labels = _corner_labels(nets)
+    touched = np.zeros(max(int(row.max()) for row in labels) + 1, dtype=bool)
+    for block, row in enumerate(labels):
+        own = spans[spans[:, 0] == block, 1:]
+        for corner in product((0, 1), repeat=3):
+            touched[row[tuple((own + corner).T)]] = True
+    return np.concatenate([_any_corner(touched[row]).ravel() for row in labels])
+
+
+@lru_cache(maxsize=4)
+def _corner_labels(nets: Nets) -> tuple[IntArray, ...]:
+    """Return the number of each corner of the spans of each block; corners that interfaces make one have one number."""
+    return shared_numbers([(u + 1, v + 1, w + 1) for u, v, w in nets.spans], nets.interfaces)[0]
+
+
+def _any_corner(corners: Mask) -> Mask:
+    """Return which cells of a grid have a marked corner."""
+    return np.asarray(np.lib.stride_tricks.sliding_window_view(corners, (2, 2, 2)).any(axis=(3, 4, 5)))
+
+
+def acting_on(spans: Mask, nets: Nets) -> Mask:
+    """Return the mask (n,) of the control points that act on marked spans (m,), on both sides of interfaces."""
+    marked = []
+    for block, counts in enumerate(nets.spans):
+        own = spans[nets.first_spans[block] : nets.first_spans[block + 1]].reshape(counts)
+        around = np.pad(own, nets.degree)
+        windows = np.lib.stride_tricks.sliding_window_view(around, (nets.degree + 1,) * 3)
+        marked.append(windows.any(axis=(3, 4, 5)).ravel())
+    return nets.merged_mask(np.concatenate(marked)) if nets.interfaces else np.concatenate(marked)
+
+
+def edge_spans(nets: Nets) -> IntArray:
+    """Return the spans (k, 4) that touch one of the 12 edges of their block."""
+    found = []
+    for counts in nets.spans:
+        index = np.indices(counts).reshape(3, -1).T
+        at_side = (index == 0) | (index == np.array(counts) - 1)
+        found.append(index[at_side.sum(axis=1) >= 2])
+    return in_blocks(found)

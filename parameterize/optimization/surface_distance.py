@@ -7,7 +7,8 @@ normal only, on sharp edges across both sides, and at corners in all directions.
 
 import numpy as np
 
-from ..arrays import Array, Knots, Mask
+from ..arrays import Array, Mask
+from ..spline.nets import Nets
 from ..surface.geometry import vertex_normals
 from .operators import PiecewiseOperator
 from .sliding import SlidingParameters
@@ -40,9 +41,9 @@ class SurfaceFit:
         self._held = np.zeros(len(points), dtype=bool)
         self.aim(points, quadrics)
 
-    def on_knots(self, knots: Knots) -> "SurfaceFit":
-        """Return the same data for a spline with other knots, at the present parameters and weights."""
-        places, given = self.places.on_knots(knots), self.given_corners
+    def on_nets(self, nets: Nets) -> "SurfaceFit":
+        """Return the same data for blocks with other knots, at the present parameters and weights."""
+        places, given = self.places.on_nets(nets), self.given_corners
         other = SurfaceFit(places, self.points, self._quadrics, self._weights, given_corners=given)
         other.give_way(self.yielding)
         return other
@@ -69,7 +70,7 @@ class SurfaceFit:
         return weights.surface
 
     def energy_and_gradient(self, control: Array) -> tuple[float, Array]:
-        """Return the sum of r^T Q r at the present parameters and its gradient (3, n_u, n_v, n_w)."""
+        """Return the sum of r^T Q r at the present parameters and its gradient (3, n)."""
         residual = self.places.rows(control) - self.points  # (N, 3)
         pulled = np.einsum("nij,nj->ni", self._metric, residual)
         return float(np.vdot(residual, pulled)), 2.0 * self.places.rows.adjoint(pulled, control)

@@ -30,13 +30,13 @@ class RoundWeights:
 
 
 class Term(Protocol):
-    """Define a term of the energy as a function of control points (3, n_u, n_v, n_w), in double precision."""
+    """Define a term of the energy as a function of control points (3, n), in double precision."""
 
     def weight(self, weights: RoundWeights) -> float:
         """Return the weight of the term in a round."""
 
     def energy_and_gradient(self, control: Array) -> tuple[float, Array]:
-        """Return the unweighted term at `control`, and its gradient (3, n_u, n_v, n_w)."""
+        """Return the unweighted term at `control`, and its gradient (3, n)."""
 
     def curvature(self, control: Array) -> PiecewiseOperator:
         """Return a positive semidefinite second derivative at `control`, as an operator in single precision."""

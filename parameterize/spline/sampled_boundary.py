@@ -47,9 +47,18 @@ class SampledBoundary:
         return cls._joined([cls._on_faces(patch, _rows(patch, least), names) for patch, names in parts])
 
     @classmethod
-    def on(cls, volume: BSplineVolume, *rows: Array) -> "SampledBoundary":
-        """Sample all six faces of a volume at three rows of parameters, each from 0 to 1."""
-        return cls._on_faces(volume, rows, FACE_NAMES)
+    def on(cls, body: BSplineVolume | MultiPatch, *rows: Array) -> "SampledBoundary":
+        """Sample all outer faces, those of all patches at the same three rows of parameters, each from 0 to 1."""
+        several = as_multipatch(body)
+        parts = zip(several.patches, several.outer, strict=True)
+        return cls._joined([cls._on_faces(patch, rows, names) for patch, names in parts])
+
+    @property
+    def sample_faces(self) -> IntArray:
+        """Return the outer face of each sample, (n,): 6 * patch + face."""
+        faces = np.empty(len(self.points), dtype=np.int64)
+        faces[self.triangles] = (6 * self.patches[self.triangles[:, 0]] + self.cube_faces)[:, None]
+        return faces
 
     @classmethod
     def _on_faces(cls, volume: BSplineVolume, rows: Sequence[Array], names: Collection[str]) -> "SampledBoundary":

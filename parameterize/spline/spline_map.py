@@ -1,4 +1,4 @@
-"""SplineMap: a map of the unit cube as the optimization holds it, component by component."""
+"""SplineMap: a map of blocks as the optimization holds it, component by component."""
 
 from dataclasses import dataclass, replace
 
@@ -6,40 +6,66 @@ import numpy as np
 
 from ..arrays import Array, Knots
 from .bspline import greville, interpolate_grid
+from .multipatch import MultiPatch
+from .nets import Nets
 from .volume import BSplineVolume
 
 
 @dataclass(frozen=True, eq=False)
 class SplineMap:
-    """A map F of one degree in all directions; control (3, n_u, n_v, n_w) in C order, which kernels run along."""
+    """A map F of one degree in all directions; control: (3, n), the control points of all blocks, see Nets."""
 
-    degree: int
-    knots: Knots
+    nets: Nets
     control: Array
+
+    @classmethod
+    def on_cube(cls, degree: int, knots: Knots, control: Array) -> "SplineMap":
+        """Return the map of one cube with control points (3, n_u, n_v, n_w)."""
+        return cls(Nets(degree, (knots,)), control.reshape(3, -1))
 
     @classmethod
     def of(cls, volume: BSplineVolume) -> "SplineMap":
         """Return the map of a polynomial volume whose degree is the same in all directions."""
         assert volume.weights is None, "the optimization moves control points, and knows no weights"
-        return cls(volume.degrees[0], volume.knots, np.ascontiguousarray(np.moveaxis(volume.control_points, -1, 0)))
+        control = np.ascontiguousarray(np.moveaxis(volume.control_points, -1, 0))
+        return cls.on_cube(volume.degrees[0], volume.knots, control)
 
     @classmethod
     def interpolating(cls, values: Array, knots: Knots, degree: int) -> "SplineMap":
-        """Return the map with these values (n_u, n_v, n_w, 3) at the Greville points of the knots."""
+        """Return the map of one cube with these values (n_u, n_v, n_w, 3) at the Greville points of the knots."""
         control = np.moveaxis(interpolate_grid(knots, degree, values), -1, 0)
-        return cls(degree, knots, np.ascontiguousarray(control))
+        return cls.on_cube(degree, knots, np.ascontiguousarray(control))
+
+    @property
+    def knots(self) -> Knots:
+        """The knots of one cube."""
+        (knots,) = self.nets.knots
+        return knots
+
+    def patch(self, block: int) -> BSplineVolume:
+        """Return the map of a block as a volume."""
+        points = np.moveaxis(self.nets.of_block(self.control, block), 0, -1)
+        return BSplineVolume((self.nets.degree,) * 3, self.nets.knots[block], points)
 
     @property
     def volume(self) -> BSplineVolume:
-        """The same map as a volume."""
-        return BSplineVolume((self.degree,) * 3, self.knots, np.moveaxis(self.control, 0, -1))
+        """The same map of one cube as a volume."""
+        assert self.nets.one_cube
+        return self.patch(0)
+
+    @property
+    def body(self) -> BSplineVolume | MultiPatch:
+        """The same map as a volume, or as several patches where there are several blocks."""
+        if self.nets.one_cube:
+            return self.volume
+        return MultiPatch(tuple(self.patch(k) for k in range(len(self.nets.knots))), self.nets.interfaces)
 
     def with_control(self, control: Array) -> "SplineMap":
-        """Return the map on the same knots with other control points (3, n_u, n_v, n_w)."""
+        """Return the map on the same knots with other control points (3, n)."""
         return replace(self, control=control)
 
     def interpolated(self, knots: Knots) -> "SplineMap":
-        """Return the map on other knots that agrees with this one at their Greville points."""
-        u, v, w = (greville(row, self.degree) for row in knots)
+        """Return the map of one cube on other knots that agrees with this one at their Greville points."""
+        u, v, w = (greville(row, self.nets.degree) for row in knots)
         values = self.volume.grid(u, v, w)
-        return SplineMap.interpolating(values, knots, self.degree)
+        return SplineMap.interpolating(values, knots, self.nets.degree)

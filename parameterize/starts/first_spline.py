@@ -27,6 +27,6 @@ def first_spline(inside: Array, places: Array, fit: SurfaceFit) -> SplineMap:
         np.concatenate([inside, fit.points]),
         np.concatenate(weights),
         fit.places.knots,
-        fit.places.degree,
+        fit.places.nets.degree,
         fairness=_FAIRNESS,
     )

@@ -67,7 +67,7 @@ class Growth(Start):
         with timed(task.seconds, "fit"), one_blas_thread():
             layout = surface_on_cube(task, self.turn)
             fit = task.fit(layout, _COARSE)
-            first = first_cube(layout, fit.places.knots, fit.places.degree)
+            first = first_cube(layout, fit.places.knots, fit.places.nets.degree)
         return optimized(first, fit, self.schedule(task.config), task, checkpoints, self.weights)
 
     @property

@@ -8,6 +8,7 @@ from functools import cached_property
 from typing import Any, Literal
 
 from ..arrays import Array, IntArray
+from ..blocks.layout import BlockLayout, block_layout
 from ..checkpoint import Checkpoints
 from ..coarse import coarse_knots, optimize_coarse_first
 from ..config import Config
@@ -21,13 +22,16 @@ from ..optimization.sliding import SlidingParameters
 from ..optimization.surface_distance import TANGENTIAL, SurfaceFit
 from ..optimization.term import Weights
 from ..progress import timed
+from ..skeleton.graph import Skeleton
+from ..skeleton.solid import skeleton_of
+from ..spline.nets import Nets
 from ..spline.spline_map import SplineMap
 from ..surface.geometry import vertex_quadrics, vertex_weights
 from ..surface.surface import Surface
 
 _log = logging.getLogger(__name__)
 
-Origin = Literal["network", "growth", "extension"]
+Origin = Literal["network", "growth", "extension", "blocks"]
 MOST_POINTS = (
     30_000  # added where long edges of the mesh are cut, else they are cut less finely: memory grows with them
 )
@@ -63,6 +67,16 @@ class Task:
         return subdivide_finely(self.surface.unit_vertices, self.surface.faces, longest, self.own + MOST_POINTS)
 
     @cached_property
+    def skeleton(self) -> Skeleton:
+        """Return the skeleton of the solid at volume 1. Raises SkeletonError where it has none."""
+        return skeleton_of(self.surface.unit_vertices, self.surface.faces, self.surface.genus)
+
+    @cached_property
+    def layout(self) -> BlockLayout:
+        """Return thin blocks along the skeleton. Raises SkeletonError and LayoutError where there are none."""
+        return block_layout(self.skeleton, self.surface.unit_vertices, self.surface.faces)
+
+    @cached_property
     def sphere(self) -> CubeLayout:
         """Return the layout of the surface, at volume 1, on the sphere."""
         surface = self.surface
@@ -74,8 +88,9 @@ class Task:
         coarse: the number of spans a direction in the first rounds, as a share of that in the last rounds.
         """
         spline = self.config.spline
+        nets = Nets(spline.degree, (coarse_knots(spline, coarse),))
         return SurfaceFit(
-            SlidingParameters(coarse_knots(spline, coarse), spline.degree, layout.places, layout.faces),
+            SlidingParameters(nets, layout.places, triangles=layout.faces),
             layout.points,
             vertex_quadrics(layout.points, layout.faces, TANGENTIAL),
             vertex_weights(layout.points, layout.faces, layout.n_own),

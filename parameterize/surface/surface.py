@@ -1,4 +1,4 @@
-"""Surface: a closed surface of genus 0, checked and repaired, or a MeshError that says why it is refused."""
+"""Surface: a closed surface of one component, checked and repaired, or a MeshError that says why it is refused."""
 
 import hashlib
 import logging
@@ -43,7 +43,7 @@ logger = logging.getLogger(__name__)
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Surface(Brief, Shown):
-    """A closed surface of genus 0, one component, wound outward, with its placement in the unit cube's space.
+    """A closed surface of one component, wound outward, with its placement in the unit cube's space.
 
     `load_surface`, `surface_from_arrays` and `sample` make surfaces.
 
@@ -108,6 +108,11 @@ class Surface(Brief, Shown):
         """Return the enclosed volume in the user's units."""
         return float(self.scale**-3.0)
 
+    @cached_property
+    def genus(self) -> int:
+        """Return the number of handles."""
+        return topology.genus_of(self.faces)
+
     @property
     def bbox(self) -> tuple[Array, Array]:
         """Return the lowest and the highest corner of the bounding box, (3,) each, in the user's units."""
@@ -128,6 +133,7 @@ class Surface(Brief, Shown):
             "vertices": len(self.vertices),
             "faces": len(self.faces),
             "volume": self.volume,
+            "genus": self.genus,
             "bbox": [corner.tolist() for corner in self.bbox],
             "self_intersections": {
                 "pairs": len(self.crossings),
@@ -176,7 +182,7 @@ def load_surface(
     Raises
     ------
     MeshError
-        A ValueError of one line, for a file that cannot be read or a surface that is not closed or not of genus 0.
+        A ValueError of one line, for a file that cannot be read or a surface that is not closed.
     TypeError
         For an object of another class.
 
@@ -297,7 +303,6 @@ def _gate(raw: RawMesh, name: str, source: str, component: int | None, max_faces
 
     topology.check_manifold(triangles, where)
     triangles, turned = wind_outward(points, triangles)
-    topology.check_genus(triangles)
     doubts = topology.slivers(points, triangles, where)
     crossings = topology.crossing_faces(points, triangles)
     if len(crossings):

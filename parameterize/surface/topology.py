@@ -1,4 +1,4 @@
-"""Checks the topology: refuses surfaces that are open, non-manifold, disconnected or of higher genus; finds crossings.
+"""Checks the topology: refuses surfaces that are open, non-manifold or disconnected; counts handles; finds crossings.
 
 Positions in messages are the user's: the caller passes `where`, which turns a vertex number into text.
 """
@@ -88,14 +88,9 @@ def check_manifold(faces: IntArray, where: Where) -> None:
         )
 
 
-def check_genus(faces: IntArray) -> None:
-    """Raise MeshError for a closed, oriented component that is no sphere (Euler: V - E + F = 2 - 2 g)."""
-    genus = (2 - (len(np.unique(faces)) - len(faces) // 2)) // 2
-    if genus:
-        raise MeshError(
-            f"genus {genus} ({genus} {'handle' if genus == 1 else 'handles'}), expected 0: a cube has no handle, so "
-            "one cube cannot be mapped one-to-one onto it; fill the tunnels or cut the model into pieces"
-        )
+def genus_of(faces: IntArray) -> int:
+    """Return the number of handles of a closed, oriented component (Euler: V - E + F = 2 - 2 g)."""
+    return (2 - (len(np.unique(faces)) - len(faces) // 2)) // 2
 
 
 def slivers(vertices: Array, faces: IntArray, where: Where) -> list[str]:

@@ -4,21 +4,24 @@ import numpy as np
 
 from parameterize.cube.cube import nearest_faces
 from parameterize.spline.bspline import greville, open_uniform_knots
+from parameterize.spline.nets import Nets
 from parameterize.spline.volume import BSplineVolume
 from parameterize.training.target_shapes import nearest_places
 
 DEGREE = 3
 KNOTS = (open_uniform_knots(6, DEGREE), open_uniform_knots(5, DEGREE), open_uniform_knots(7, DEGREE))
+NETS = Nets(DEGREE, (KNOTS,))
 
 
 def wavy_control(amplitude=0.02):
     rows = [greville(k, DEGREE) for k in KNOTS]
     points = np.stack(np.meshgrid(*rows, indexing="ij"))
-    return points + amplitude * np.random.default_rng(0).uniform(-1.0, 1.0, points.shape)
+    points = points + amplitude * np.random.default_rng(0).uniform(-1.0, 1.0, points.shape)
+    return points.reshape(3, -1)
 
 
 def as_volume(control):
-    return BSplineVolume((DEGREE,) * 3, KNOTS, np.moveaxis(control, 0, -1))
+    return BSplineVolume((DEGREE,) * 3, KNOTS, np.moveaxis(NETS.of_block(control, 0), 0, -1))
 
 
 def on_the_cube(count, seed=0):

@@ -1,0 +1,131 @@
+"""Lays sections across a branch: frames carried along it, the turn between its two ends spread out."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..arrays import Array
+from .frames import angle_about, arc_lengths, at_lengths, carried, tangents, turned, unit
+from .inside import Body
+from .widths import THIN, half_widths
+
+_STEP = 0.7  # of the median radius: the distance of sections
+_FEWEST, _MOST = 4, 60  # sections of a branch
+_BLEND = 1.5  # times half the width of a junction's face: over which sections take that of the branch
+_SIGNS = np.array([[[-1.0, -1.0], [-1.0, 1.0]], [[1.0, -1.0], [1.0, 1.0]]])  # (2, 2, 2) of u, v at the corners [u][v]
+
+
+@dataclass(frozen=True, eq=False)
+class Rod:
+    """Sections across a curve, before they are made thinner.
+
+    Attributes
+    ----------
+    centers : (m, 3) array
+    offsets : (m, 2, 2, 3) array
+        From the centers to the corners [u][v].
+    radius : float
+        The median distance of the curve from the surface.
+    """
+
+    centers: Array
+    offsets: Array
+    radius: float
+
+    def sections(self, shrink: Array) -> Array:
+        """Return the corners (m, 2, 2, 3) of sections whose size is multiplied by factors (m,)."""
+        return np.asarray(self.centers[:, None, None] + shrink[:, None, None, None] * self.offsets)
+
+    @property
+    def length(self) -> float:
+        """Return the length of the curve through the centers."""
+        return float(arc_lengths(self.centers)[-1])
+
+    @property
+    def body_width(self) -> float:
+        """Return the mean width that the body has in the directions of the sections' sides."""
+        sides = self.offsets[:, 1] - self.offsets[:, 0], self.offsets[:, :, 1] - self.offsets[:, :, 0]
+        return float(np.mean([np.linalg.norm(side, axis=-1).mean() for side in sides])) / THIN
+
+
+def ends_turned(first: Array, last: Array, curve: Array) -> Array:
+    """Return the corners (2, 2, 3) of a rod's last face in the order, of four, that needs the least turn.
+
+    first, last: (2, 2, 3) corners [u][v] of the first and the last face, right-handed with the curve (k, 3).
+    """
+    along = tangents(curve)
+    across = carried(_side(first), along)[-1]
+    ways = [np.rot90(last, k) for k in range(4)]
+    return min(ways, key=lambda way: round(abs(angle_about(along[-1], across, _side(way))), 9))
+
+
+def rod(
+    points: Array, radii: Array, span: tuple[float, float], first: Array | None, last: Array | None, body: Body
+) -> Rod:
+    """Return the sections across a curve (k, 3) between two arc lengths, which may lie beyond its ends.
+
+    radii: (k,) its distances from the surface. first, last: (2, 2, 3) corners [u][v] of given faces at its ends,
+    right-handed with the curve; None at the tip of a limb.
+    """
+    radius = float(np.median(radii))
+    count = int(np.clip(np.ceil((span[1] - span[0]) / (_STEP * radius)) + 1, _FEWEST, _MOST))
+    lengths = np.linspace(*span, count)
+    centers = at_lengths(points, lengths)
+    along = tangents(centers)
+    if first is None and last is not None:
+        across = carried(_side(last), along[::-1])[::-1]
+    else:
+        across = carried(flattest(centers, along, body) if first is None else _side(first), along)
+    if first is not None and last is not None:
+        turn = angle_about(along[-1], across[-1], _side(last))
+        across = turned(across, along, np.linspace(0.0, turn, count))
+    offsets = plain_offsets(centers, along, across, body)
+    for face, place in ((first, 0), (last, -1)):
+        if face is not None:
+            centers, offsets = _led_to(face, centers, offsets, lengths if place == 0 else lengths[::-1], place)
+    return Rod(centers, offsets, radius)
+
+
+def plain_offsets(centers: Array, along: Array, across: Array, body: Body) -> Array:
+    """Return the offsets (m, 2, 2, 3) of the corners of sections as wide as the body allows."""
+    beside = np.cross(along, across)
+    steps = np.maximum(np.gradient(arc_lengths(centers)), 1e-300)
+    curvature = np.gradient(along, axis=0) / steps[:, None]
+    half = half_widths(centers, across, beside, curvature, body)
+    axes = np.stack([across, beside], axis=1)
+    return np.einsum("uvd,kd,kda->kuva", _SIGNS, half, axes)
+
+
+def flattest(centers: Array, along: Array, body: Body) -> Array:
+    """Return the vector (3,) across the first tangent whose carried copies are farthest from the surface.
+
+    Along it the sections of a flat body are wide.
+    """
+    start = unit(np.cross(along[0], np.eye(3)[int(np.argmin(np.abs(along[0])))]))
+    frame = carried(start, along)
+    angles = np.linspace(0.0, np.pi, 12, endpoint=False)
+    ways = np.stack([turned(frame, along, np.full(len(along), angle)) for angle in angles])
+    widths = np.minimum(body.rays(centers, ways), body.rays(centers, -ways))
+    return np.asarray(ways[int(np.argmax(np.median(widths, axis=1).round(9))), 0])
+
+
+def _side(corners: Array) -> Array:
+    """Return the mean direction (3,) of u on a face."""
+    return unit((corners[1] - corners[0]).mean(axis=0))
+
+
+def _led_to(face: Array, centers: Array, offsets: Array, lengths: Array, place: int) -> tuple[Array, Array]:
+    """Return centers and offsets that begin, or end, in a given face, from which they part little by little.
+
+    lengths: (m,) in the order in which the face comes first.
+    """
+    middle = face.mean(axis=(0, 1))
+    reach = _BLEND * np.linalg.norm(face - middle, axis=-1).max()
+    away = np.abs(lengths - lengths[0])
+    away = away if place == 0 else away[::-1]
+    reach = min(float(reach), 0.5 * float(away.max()))
+    share = np.clip(away / reach, 0.0, 1.0)
+    share = share**2 * (3.0 - 2.0 * share)
+    moved = centers + (1.0 - share)[:, None] * (middle - centers[place])
+    mixed = share[:, None, None, None] * offsets + (1.0 - share)[:, None, None, None] * (face - middle)
+    return moved, mixed

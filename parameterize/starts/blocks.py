@@ -1,0 +1,76 @@
+"""Starts from thin blocks along the solid's skeleton, which the rounds draw to the surface.
+
+A body with handles is no image of one cube, and limbs are squeezed on it. Blocks with square sections along the
+branches of the curve skeleton, glued by whole faces at blocks where branches meet, follow both. The surface is not laid
+out on them: its points take the nearest places on the blocks anew before each round (reassignment.py).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..arrays import Array
+from ..blocks.layout import Block, BlockLayout
+from ..checkpoint import Checkpoints
+from ..optimization.phases import Polish, Schedule, Separate, Shape, Unfold
+from ..optimization.reassignment import reassign
+from ..optimization.sliding import SlidingParameters
+from ..optimization.surface_distance import TANGENTIAL, SurfaceFit
+from ..progress import timed
+from ..spline.bspline import greville, open_uniform_knots
+from ..spline.nets import Nets
+from ..spline.spline_map import SplineMap
+from ..surface.geometry import vertex_quadrics, vertex_weights
+from ..threads import one_blas_thread
+from .on_cube import MORE_ROUNDS
+from .start import Attempt, Start, Task, optimized
+
+_USUAL_STEPS = (30, 12, 8)  # of Newton's method in the rounds of most runs: tells the time left
+
+
+@dataclass(frozen=True)
+class AlongSkeleton(Start):
+    """Make a map of several blocks along the branches of the solid's skeleton."""
+
+    def make(self, task: Task, checkpoints: Checkpoints) -> Attempt:
+        """Lay thin blocks along the skeleton, draw them to the surface and return the attempt."""
+        spline = task.config.spline
+        with timed(task.seconds, "fit"), one_blas_thread():
+            first = thin_blocks(task.layout, spline.degree)
+            fit = _surface_fit(task, first)
+        phases = Shape(), Unfold(), Separate(), Polish()
+        return optimized(first, fit, Schedule(phases, spline.rounds + MORE_ROUNDS, _USUAL_STEPS), task, checkpoints)
+
+
+BLOCKS = AlongSkeleton("blocks", "blocks", "laying blocks along the skeleton")
+
+
+def thin_blocks(layout: BlockLayout, degree: int) -> SplineMap:
+    """Return the map whose control points are points of the layout's rods, at the Greville points of uniform knots."""
+    knots = [tuple(open_uniform_knots(degree + spans, degree) for spans in block.spans) for block in layout.blocks]
+    nets = Nets(degree, tuple(knots), layout.interfaces)  # type: ignore[arg-type]
+    pairs = zip(layout.blocks, knots, strict=True)
+    points = [_points(block, [greville(row, degree) for row in rows]) for block, rows in pairs]
+    return SplineMap(nets, nets.merged(nets.joined(points)))
+
+
+def _points(block: Block, rows: list[Array]) -> Array:
+    """Return the points (3, n_u, n_v, n_w) of a rod on a grid of parameters."""
+    places = np.stack(np.meshgrid(*rows, indexing="ij"), axis=-1)
+    return np.moveaxis(block.points(places), -1, 0)
+
+
+def _surface_fit(task: Task, first: SplineMap) -> SurfaceFit:
+    """Return the surface's points, each with its first place on the blocks."""
+    points, faces = task.mesh
+    face = int(np.flatnonzero(first.nets.exposed)[0])  # any: places are assigned at once
+    places = np.full((len(points), 3), 0.5)
+    places[:, face % 6 // 2] = face % 2
+    fit = SurfaceFit(
+        SlidingParameters(first.nets, places, np.full(len(points), face), faces),
+        points,
+        vertex_quadrics(points, faces, TANGENTIAL),
+        vertex_weights(points, faces, task.own),
+    )
+    reassign(fit, first.control, first=True)
+    return fit
