@@ -153,14 +153,14 @@ def _pass_seconds(config: Config, device: str, clock: Clock) -> float:
 
 
 def _product_seconds(spline: SplineConfig, clock: Clock) -> float:
-    from parameterize.optimization.distortion import Distortion
+    from parameterize.optimization.distortion import BlockDistortion
     from parameterize.spline.bspline import greville, open_uniform_knots
 
     count = min(spline.control_points, LARGEST)
     knots = open_uniform_knots(count, spline.degree)
     rows = greville(knots, spline.degree)
     control = np.stack(np.meshgrid(rows, rows, rows, indexing="ij"))
-    product = Distortion((knots, knots, knots), spline.degree).curvature(control)
+    product = BlockDistortion((knots, knots, knots), spline.degree).curvature(control)
     single = control.astype(np.float32)
     seconds = _fastest(lambda: float(product(single).sum()), clock)
     return seconds * (spline.control_points / count) ** 3
