@@ -51,7 +51,9 @@ def test_the_tables_have_a_row_a_surface_and_count_what_is_sound(tmp_path):
     assert "Certified and one-to-one 1 of 3. ARAP mean: median 0.200, largest 0.300." in text
     assert "Not finished yet: 1 of 4 surfaces." in text and "no measurement" not in text
     quick = options(tmp_path, "torus", mapping=MapOptions(steps_factor=0.1))
-    assert "no measurement" in handles.as_text([RING], quick)
+    assert "no measurement" in handles.as_text([RING], quick) and "At most" not in handles.as_text([RING], quick)
+    cube = options(tmp_path, "torus", mapping=MapOptions(blocks=1))
+    assert "At most 1 block." in handles.as_text([RING], cube)
 
 
 def test_a_map_is_sound_where_both_is_proved():
@@ -129,6 +131,11 @@ def test_the_lists_have_made_surfaces_and_models(tmp_path, monkeypatch):
     assert [(one.name, one.list) for one in two] == [("dog", "limbs"), ("ant", "limbs")]
 
 
+def test_blocks_are_an_option_of_the_map(tmp_path):
+    assert handles._options(["--out", str(tmp_path)]).mapping.blocks == "auto"
+    assert handles._options(["--blocks", "1", "--out", str(tmp_path)]).mapping.blocks == 1
+
+
 def test_a_made_surface_is_written_before_it_is_computed(tmp_path, monkeypatch):
     seen = []
     monkeypatch.setitem(
@@ -144,6 +151,8 @@ def test_bad_arguments_are_one_line(tmp_path, capsys):
     for given, word in (
         (("--jobs", "0"), "--jobs 0"),
         (("--lists", "round"), "round"),
+        (("--blocks", "few"), "--blocks"),
+        (("--blocks", "0"), "blocks"),
         (("--only", "horse"), "--only horse: no such surface; there are torus, "),
         (("--files", "a/x.obj", "b/x.obj"), "x: two surfaces have this name"),
         (("--steps-factor", "nan"), "steps factor must be a positive number"),

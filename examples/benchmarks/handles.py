@@ -1,7 +1,7 @@
 """Surfaces with handles and limbs by default settings: certified, one-to-one, how distorted and how close.
 
     python examples/benchmarks/handles.py --jobs 2
-    python examples/benchmarks/handles.py --lists everyday limbs --out out/handles
+    python examples/benchmarks/handles.py --lists limbs --blocks 1 --out out/one_cube
     python examples/benchmarks/handles.py --files downloads/*.off --out out/downloads
 
 Runs the surfaces of handle_shapes.py and the models with handles and limbs as `iga-nn batch` does, with one thread
@@ -18,7 +18,7 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from statistics import median
-from typing import Any
+from typing import Any, Literal
 
 import handle_shapes as shapes
 import processes
@@ -149,7 +149,7 @@ def _told(row: Row) -> str:
 def _options(argv: list[str] | None) -> Options:
     parser = _parser()
     given = parser.parse_args(argv)
-    mapping = MapOptions(device="cpu", steps_factor=given.steps_factor, resume=True)
+    mapping = MapOptions(device="cpu", blocks=given.blocks, steps_factor=given.steps_factor, resume=True)
     if given.jobs < 1:
         parser.error(f"--jobs {given.jobs}: must be at least 1")
     lists = given.lists or ([] if given.files else list(MADE))
@@ -179,10 +179,15 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--only", nargs="+", default=[], metavar="NAME", help="these surfaces alone")
     parser.add_argument("--files", nargs="+", default=[], type=Path, metavar="FILE", help="these files instead")
     parser.add_argument("--models", type=Path, default=models, help=f"folder of the models (default: {models})")
+    parser.add_argument("--blocks", type=_blocks, default="auto", help='at most so many, or "auto" (default: auto)')
     parser.add_argument("--jobs", type=int, default=1, help="surfaces at a time (default: 1)")
     parser.add_argument("--out", type=Path, default=Path("out/handles"), help="folder (default: out/handles)")
     parser.add_argument("--steps-factor", type=float, default=1.0, help="shorten every stage, for a quick look")
     return parser
+
+
+def _blocks(text: str) -> int | Literal["auto"]:
+    return "auto" if text == "auto" else int(text)
 
 
 # Surfaces
@@ -287,6 +292,8 @@ def as_text(rows: Sequence[Row], options: Options) -> str:
             parts += [f"## {heading}", processes.as_markdown(HEAD, map(_cells, own)), summary(own)]
     if missing := len(options.surfaces) - len(rows):
         parts.append(f"Not finished yet: {missing} of {len(options.surfaces)} surfaces.")
+    if options.mapping.blocks != "auto":
+        parts.append(f"At most {options.mapping.blocks} {'block' if options.mapping.blocks == 1 else 'blocks'}.")
     if options.mapping.steps_factor != 1.0:
         parts.append(f"Every stage's steps times {options.mapping.steps_factor:g}: a quick look, no measurement.")
     versions = ", ".join(f"{name} {number}" for name, number in reports.versions().items())
