@@ -20,11 +20,12 @@ from .cube.boundary_map import BoundaryMap, boundary_map
 from .cube.layout import CubeLayout
 from .display import Brief
 from .optimization.optimized import Optimized
+from .optimization.reassignment import reassign
 from .optimization.surface_distance import SurfaceFit
 from .progress import History, ProgressCallback, ignore, timed
 from .quality.quality import QualityReport, measure
 from .refinement import Refinement, refine
-from .spline.multipatch import MultiPatch
+from .spline.multipatch import MultiPatch, as_multipatch
 from .spline.volume import BSplineVolume
 from .starts.start import Origin, Task
 from .starts.tried import AttemptReport, best_of
@@ -248,12 +249,22 @@ def corner_vertices(surface: Surface, corners: ArrayLike) -> IntArray:
     return np.asarray(numbers, dtype=np.int64)
 
 
-def _in_users_units(found: Optimized, fit: SurfaceFit, task: Task) -> tuple[BSplineVolume, BoundaryMap]:
-    """Return the volume and its boundary map; parameters are first brought close to this volume's closest points."""
-    surface, spline = task.surface, task.config.spline
-    places = fit.places.at_closest_points(found.spline.control, fit.points, _LAST_SLIDES, _LAST_SWEEPS)
-    points = surface.from_unit(found.spline.volume.control_points)
-    volume = BSplineVolume((spline.degree,) * 3, places.knots, points)
+def _in_users_units(
+    found: Optimized, fit: SurfaceFit, task: Task
+) -> tuple[BSplineVolume | MultiPatch, BoundaryMap]:
+    """Return the map and its boundary map; parameters are first brought close to this map's closest points."""
+    surface, spline = task.surface, found.spline
+    if not spline.nets.one_cube:
+        reassign(fit, spline.control)
+    places = fit.places.at_closest_points(spline.control, fit.points, _LAST_SLIDES, _LAST_SWEEPS)
+    patches = tuple(
+        replace(patch, control_points=surface.from_unit(patch.control_points)) for patch in as_multipatch(spline.body)
+    )
+    if not spline.nets.one_cube:
+        parts = {"part_faces": surface.faces, "groups": surface.groups, "patches": places.blocks[: task.own]}
+        boundary = BoundaryMap(surface.vertices, places.parameters[: task.own], surface.faces, **parts)
+        return MultiPatch(patches, spline.nets.interfaces), boundary
+    (volume,) = patches
     own = np.concatenate([surface.vertices, surface.from_unit(fit.points[task.own :])])
     boundary = boundary_map(volume, CubeLayout(own, places.triangles, places.parameters, task.own))
     return volume, replace(boundary, part_faces=surface.faces, groups=surface.groups)

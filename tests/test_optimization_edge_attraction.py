@@ -1,13 +1,16 @@
 import numpy as np
 import pytest
+from block_bodies import BODIES, uniform_nets
 from shapes import ball
 
-from parameterize.cube.cube import CORNERS, snap
+from parameterize.cube.cube import CORNERS, EDGES, snap
 from parameterize.optimization.edge_attraction import EdgeAnchors, edge_points
 from parameterize.optimization.sliding import SlidingParameters
 from parameterize.optimization.surface_distance import TANGENTIAL, SurfaceFit
 from parameterize.spline.bspline import greville, open_uniform_knots
+from parameterize.spline.interface import Interface
 from parameterize.spline.nets import Nets
+from parameterize.spline.volume import FACE_NAMES
 from parameterize.surface.geometry import vertex_quadrics, vertex_weights
 
 NETS = Nets(3, ((open_uniform_knots(6, 3),) * 3,))  # three spans a direction
@@ -84,3 +87,27 @@ def test_given_corners_are_held_beside_the_others_and_alone():
     _, gradient = anchors.fit.energy_and_gradient(control)
     downhill = -NETS.of_block(gradient, 0)[:, [0, -1]][:, :, [0, -1]][:, :, :, [0, -1]].reshape(3, 8).T
     np.testing.assert_allclose(downhill / np.abs(downhill).max(), (wanted - CORNERS) / 0.23, atol=1e-12)
+
+
+@pytest.mark.parametrize("name", BODIES)
+def test_edge_points_of_blocks_lie_on_the_edges_of_exposed_faces(name):
+    """An edge between a face of the boundary and a glued one has points, an edge between two glued ones has none."""
+    spline = BODIES[name](7)
+    nets = spline.nets
+    points, faces = edge_points(nets)
+    assert nets.exposed[faces].all()
+    assert (points[np.arange(len(points)), faces % 6 // 2] == faces % 2).all()
+    for block in range(len(nets.knots)):
+        found = {tuple(p) for p in points[faces // 6 == block]}
+        assert len(found) == (faces // 6 == block).sum()
+        for i, j in EDGES:
+            middle = (CORNERS[i] + CORNERS[j]) / 2.0
+            at = [6 * block + 2 * axis + int(middle[axis]) for axis in range(3) if middle[axis] in (0.0, 1.0)]
+            assert (tuple(middle) in found) == nets.exposed[at].any()
+
+
+def test_a_block_whose_faces_are_all_glued_has_no_edge_points():
+    around = [Interface((0, face), (k + 1, face)) for k, face in enumerate(FACE_NAMES)]
+    nets = uniform_nets(*[(2, 2, 2)] * 7, interfaces=around)
+    _, faces = edge_points(nets)
+    assert set(faces // 6) == set(range(1, 7))

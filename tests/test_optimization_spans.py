@@ -1,7 +1,8 @@
 import numpy as np
 import pytest
-from block_bodies import BODIES, uniform_nets
+from block_bodies import BODIES, rod, sampled, uniform_nets
 
+from parameterize.optimization.sliding import SlidingParameters
 from parameterize.optimization.spans import acting_on, edge_spans, in_blocks, numbers, with_neighbours
 
 
@@ -86,3 +87,16 @@ def test_control_points_that_act_are_those_that_move_the_map_there(name, turn):
         expected[nets.starts[block] : nets.starts[block + 1]] += window.ravel()
     assert np.array_equal(acting, nets.merged(expected) > 0.0)
     assert np.array_equal(nets.merged_mask(acting), acting) and not acting.all()
+
+
+def test_points_near_spans_are_found_across_an_interface():
+    spline = rod(7, lengths=(1.0, 2.0))
+    surface = sampled(spline, 13)  # four steps a span
+    places = SlidingParameters(spline.nets, surface.parameters, surface.sample_faces)
+    spans = places.spans()
+    assert np.array_equal(spans[:, 0], surface.sample_faces // 6)
+    assert np.array_equal(spans[:, 1:], np.minimum((3.0 * surface.parameters + 1e-9).astype(np.int64), 2))
+    near = places.near_spans(np.array([[0, 2, 1, 1]]))  # at the interface, in the middle of a section of 3 x 3 spans
+    x = places.values(spline.control)[:, 0]
+    assert near[(x > 0.4) & (x < 1.6)].all() and not near[(x < 0.3) | (x > 1.7)].any()
+    assert near[spans[:, 0] == 1].any()

@@ -1,6 +1,6 @@
 """Penalises the Bernstein coefficients of det J over chosen spans, the same numbers that the certificate tests.
 
-A penalty on sampled determinants leaves folds between the samples, above all along the 12 edges of the cube: there the
+A penalty on sampled determinants leaves folds between the samples, above all along the 12 edges of a block: there the
 surface is smooth, so the three tangents of an exact fit lie in one plane and det J vanishes. Here the fit gives way: in
 the first spans next to an edge F keeps a small crease, as large as the floor on the coefficients demands.
 

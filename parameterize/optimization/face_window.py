@@ -34,7 +34,7 @@ def polynomials_of(nets: Nets) -> Polynomials:
 class FaceWindow:
     """Hold the numbers (N, k) of control points, and the values and derivatives in_a, in_b (N, 2, p + 1) of functions.
 
-    in_a and in_b belong to the two directions of the point's cube face.
+    in_a and in_b belong to the two directions of the point's face.
     """
 
     indices: IntArray
@@ -43,7 +43,7 @@ class FaceWindow:
 
     @classmethod
     def at(cls, polynomials: Polynomials, parameters: Array, cube_faces: IntArray) -> "FaceWindow":
-        """Return the window of the basis functions at points (N, 3) on cube faces (N,)."""
+        """Return the window of the basis functions at points (N, 3) on faces (N,)."""
         found = in_parallel(
             lambda rows: _face_windows(polynomials, parameters[rows], cube_faces[rows]), pieces(len(cube_faces))
         )
@@ -69,7 +69,7 @@ class FaceWindow:
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def _face_windows(polynomials: Polynomials, parameters: Array, cube_faces: IntArray) -> tuple[IntArray, Array, Array]:
-    """Return the three arrays of a FaceWindow for points (N, 3) on cube faces (N,)."""
+    """Return the three arrays of a FaceWindow for points (N, 3) on faces (N,)."""
     count, width = len(parameters), polynomials[3].shape[1]
     indices = np.empty((count, width * width), np.int64)
     in_a, in_b = np.empty((count, 2, width)), np.empty((count, 2, width))

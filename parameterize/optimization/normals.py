@@ -2,7 +2,8 @@
 
 A boundary that runs back over itself may have det J > 0 everywhere: its middle part faces inwards, and the closest
 points of the mesh cannot be one-to-one on it. The penalty demands (t_a x t_b) . n >= floor at the surface points, with
-t_a and t_b the tangents of F along the cube's face and n the mesh's normal (one-sided, unlike L_norm, section 4.4.1).
+t_a and t_b the tangents of F along a block's face, measured in the lengths of the block's sides, and n the mesh's
+normal (one-sided, unlike L_norm, section 4.4.1).
 """
 
 from dataclasses import dataclass
@@ -24,8 +25,8 @@ _MARGIN = 3.0  # times that: points below may fall under it in the next step and
 class FacingPenalty:
     """Compute the sum of weight * (floor - (t_a x t_b) . n)_+^2 over k points.
 
-    tangents: the rows that yield t_a and t_b at the points. normals: (3, k); a normal points out of the cube where (a,
-    b, outwards) is right-handed, and into it elsewhere. weights: (k,).
+    tangents: the rows that yield t_a and t_b at the points. normals: (3, k); a normal points out of the block where
+    (a, b, outwards) is right-handed, and into it elsewhere. weights: (k,).
     """
 
     tangents: tuple[ControlRows, ControlRows]

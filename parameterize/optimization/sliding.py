@@ -1,6 +1,6 @@
-"""Places points on the boundary of the cube, and lets them slide there.
+"""Places points on the faces of blocks that form the boundary, and lets them slide there.
 
-Between optimisation steps every parameter moves to the closest point of F's boundary, across the cube's edges where
+Between optimisation steps every parameter moves to the closest point of F's boundary, across edges of faces where
 necessary. The paper keeps the parameters fixed (section 4.3.2), which keeps the network's correspondence; slides lower
 the boundary error and the distortion together.
 """
@@ -33,8 +33,8 @@ class SlidingParameters:
     The points to which parameters slide are not part of this class, because the samples of contact.py have none.
     SurfaceFit, a term of the energy, adds the points, their metrics and their weights.
 
-    cube_faces: those of the parameters, 6 * block + face; by default the nearest ones of one cube. triangles: (m, 3),
-    between the points; on one cube, `relax` and `slide` keep the layout of these one-to-one. On a body of several
+    cube_faces: the faces, 6 * block + face; by default the nearest ones of one cube. triangles: (m, 3), between the
+    points; on one cube, `relax` and `slide` keep the layout of these one-to-one. On a body of several
     blocks parameters are assigned anew before each round (reassignment.py), and there is no layout to keep.
     """
 
@@ -51,7 +51,7 @@ class SlidingParameters:
 
     @property
     def knots(self) -> Knots:
-        """The knots of one cube."""
+        """Return the knots of one cube."""
         (knots,) = self.nets.knots
         return knots
 
@@ -66,7 +66,7 @@ class SlidingParameters:
         return self.boxes[self.blocks, a], self.boxes[self.blocks, b]
 
     def place(self, parameters: Array, cube_faces: IntArray) -> None:
-        """Set the parameters (N, 3) and their cube faces (N,)."""
+        """Set the parameters (N, 3) and their faces (N,)."""
         self.parameters, self.cube_faces = parameters, cube_faces
         for known in ("window", "rows"):
             self.__dict__.pop(known, None)
@@ -208,7 +208,7 @@ def _slid(
 ) -> tuple[Array, Array, IntArray, IntArray, Array, Array]:
     """Compute the step of `SlidingParameters.slide` at points (N, 3) with a given FaceWindow.
 
-    Returns the ends of the steps in the planes of the faces (N, 3), the new parameters, their cube faces and their
+    Returns the ends of the steps in the planes of the faces (N, 3), the new parameters, their faces and their
     FaceWindow.
     """
     goal, parameters, cube_faces = parameters.copy(), parameters.copy(), cube_faces.copy()

@@ -25,15 +25,6 @@ def numbers(spans: IntArray, nets: Nets) -> IntArray:
     return np.asarray(nets.first_spans[spans[:, 0]] + inside)
 
 
-def of_numbers(chosen: IntArray, nets: Nets) -> IntArray:
-    """Return the spans (k, 4) with these numbers (k,)."""
-    blocks = np.searchsorted(nets.first_spans, chosen, "right") - 1
-    inside = chosen - nets.first_spans[blocks]
-    counts = np.array(nets.spans)[blocks]
-    u, rest = np.divmod(inside, counts[:, 1] * counts[:, 2])
-    return np.stack([blocks, u, *np.divmod(rest, counts[:, 2])], axis=1)
-
-
 def with_neighbours(spans: IntArray, nets: Nets) -> Mask:
     """Return the mask (m,) of the spans (k, 4) and of all spans that touch these, through interfaces too."""
     labels = _corner_labels(nets)
@@ -64,7 +55,7 @@ def acting_on(spans: Mask, nets: Nets) -> Mask:
         around = np.pad(own, nets.degree)
         windows = np.lib.stride_tricks.sliding_window_view(around, (nets.degree + 1,) * 3)
         marked.append(windows.any(axis=(3, 4, 5)).ravel())
-    return nets.merged_mask(np.concatenate(marked)) if nets.interfaces else np.concatenate(marked)
+    return nets.merged_mask(np.concatenate(marked))
 
 
 def edge_spans(nets: Nets) -> IntArray:

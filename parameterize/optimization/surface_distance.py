@@ -1,6 +1,6 @@
 """Measures how close the boundary of F is to the surface: residuals at surface points whose parameters slide.
 
-Each surface point v has a parameter p on the cube's boundary. The energy is a weighted sum of r^T (Q + t I) r, with r =
+Each surface point v has a parameter p on the boundary. The energy is a weighted sum of r^T (Q + t I) r, with r =
 F(p) - v and Q the mean of n n^T over the triangles around v: on smooth parts this measures the distance along the
 normal only, on sharp edges across both sides, and at corners in all directions.
 """

@@ -38,7 +38,7 @@ class SplineMap:
 
     @property
     def knots(self) -> Knots:
-        """The knots of one cube."""
+        """Return the knots of one cube."""
         (knots,) = self.nets.knots
         return knots
 
@@ -49,13 +49,13 @@ class SplineMap:
 
     @property
     def volume(self) -> BSplineVolume:
-        """The same map of one cube as a volume."""
+        """Return the same map of one cube as a volume."""
         assert self.nets.one_cube
         return self.patch(0)
 
     @property
     def body(self) -> BSplineVolume | MultiPatch:
-        """The same map as a volume, or as several patches where there are several blocks."""
+        """Return the same map as a volume, or as several patches where there are several blocks."""
         if self.nets.one_cube:
             return self.volume
         return MultiPatch(tuple(self.patch(k) for k in range(len(self.nets.knots))), self.nets.interfaces)
