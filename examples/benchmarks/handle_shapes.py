@@ -18,7 +18,10 @@ import limbed_shapes as limbed
 import machined_shapes as machined
 import smooth_shapes as smooth
 from distance_fields import Triangles, has_genus
+from processes import compute_measured
 
+from iga_nn.batch.task import Task
+from iga_nn.workflow.worker_run import Ended
 from parameterize.files import save_text
 from parameterize.surface.surface import MeshError
 from parameterize.surface.topology import crossing_faces
@@ -102,6 +105,16 @@ def write_shape(name: str, path: Path) -> None:
     rows += [f"v {x!r} {y!r} {z!r}" for x, y, z in vertices.tolist()]
     rows += [f"f {a} {b} {c}" for a, b, c in (faces + 1).tolist()]
     save_text(path, "\n".join(rows) + "\n")
+
+
+def compute_named(task: Task, number: int, batch: str) -> Ended:
+    """Make the surface that `task` names where its mesh is not there; then compute it, measured."""
+    try:
+        if not Path(task.mesh).is_file():
+            write_shape(task.name, Path(task.mesh))
+    except MeshError as error:
+        return Ended("refused", str(error))
+    return compute_measured(task, number, batch)
 
 
 if __name__ == "__main__":
