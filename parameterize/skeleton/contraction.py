@@ -81,15 +81,17 @@ def _divide(web: Web, node: Key, depth: Depth) -> None:
     stems = [arc for arc in stems if length_of(arc.path) > 2.0 * radius] or stems
     stem = max(stems, key=lambda arc: float(np.median(depth.at(arc.path))))
     path = stem.from_node(node)
-    place = path[_at_distance(path, radius)]
-    new = web.node_at(place)
-    direction = place - web.nodes[node]
-    others = [arc for arc in web.arcs_at(node) if arc.first != arc.last and new not in (arc.first, arc.last)]
-    others.sort(key=lambda arc: -_along(arc.from_node(node), radius, direction))
-    stub = next(arc for arc in web.arcs_at(node) if new in (arc.first, arc.last)).from_node(new)
-    for arc in others[: max(min(web.degree(node) - MOST + 1, MOST - 2), 1)]:
-        moved = Arc(new, arc.other(node), np.concatenate([stub, arc.from_node(node)[1:]]))
-        web.arcs[next(i for i, own in enumerate(web.arcs) if own is arc)] = moved
+    cut = _at_distance(path, radius)
+    new = web.add_node(path[cut])
+    others = [arc for arc in web.arcs_at(node) if arc.first != arc.last and arc is not stem]
+    others.sort(key=lambda arc: -_along(arc.from_node(node), radius, path[cut] - path[0]))
+    moved = others[: max(min(web.degree(node) - MOST + 1, MOST - 2), 1)]
+    kept = [arc for arc in web.arcs if all(arc is not gone for gone in [stem, *moved])]
+    parts = [Arc(node, new, path[: cut + 1]), Arc(new, stem.other(node), path[cut:])]
+    # Both ends of the first, straight step of a moved arc lie in the ball around the node, which is inside the body.
+    outer = [(arc.other(node), arc.from_node(node)) for arc in moved]
+    parts += [Arc(new, other, np.vstack([path[cut], curve[_at_distance(curve, radius) :]])) for other, curve in outer]
+    web.arcs = kept + parts
 
 
 def _at_distance(path: Array, radius: float) -> int:
