@@ -5,6 +5,7 @@ A body with handles, and one with limbs, starts from blocks along its skeleton.
 
 import logging
 
+from .blocks.layout import LayoutError
 from .checkpoint import Checkpoints
 from .starts.blocks import BLOCKS
 from .starts.extension import EXTENSION
@@ -19,7 +20,14 @@ STARTS: tuple[Start, ...] = (NETWORK, GROWTH, EXTENSION, STIFF, LAST)
 
 
 def starts_of(task: Task) -> tuple[Start, ...]:
-    """Return the starts that suit the body and the options, in their order."""
+    """Return the starts that suit the body and the options, in their order.
+
+    Raises LayoutError for one cube on a body with handles.
+    """
+    if task.surface.genus and task.config.blocks == 1:
+        raise LayoutError(
+            f"genus {task.surface.genus}: no map from one cube onto a body with handles is one-to-one; allow more blocks"
+        )
     if task.surface.genus or (task.config.blocks or 1) > 1:
         return (BLOCKS,)
     on_one_cube = task.config.blocks == 1 or task.given_corners is not None or task.choice.division == "cube"

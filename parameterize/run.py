@@ -101,7 +101,7 @@ def parameterize(
     checkpoint_dir: str | Path | None = None,
     resume: bool = False,
 ) -> Parameterization:
-    """Map the unit cube onto the solid inside a closed surface (paper, section 4.3).
+    """Map the unit cube onto the solid inside a closed surface (paper, section 4.3), or several blocks.
 
     Parameters
     ----------
@@ -139,6 +139,10 @@ def parameterize(
         For a negative seed, bad corners, another precision or a device that is not there.
     CheckpointError
         For a checkpoint of another run.
+    LayoutError
+        For a body with handles where `config.blocks` allows one, or fewer than its skeleton needs.
+    SkeletonError
+        For a body with handles whose tunnel is knotted, or that has too thin a part.
     PathError
         Where the training stays too far from a cube for its edges to be found.
 

@@ -6,7 +6,7 @@ import dataclasses
 
 import numpy as np
 import pytest
-from bodies import capsule, implicit, plate, ring, star
+from thick_bodies import capsule, implicit, plate, ring, star
 
 from parameterize.skeleton.choice import choose
 from parameterize.skeleton.graph import Branch, Skeleton

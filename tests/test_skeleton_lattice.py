@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from bodies import capsule, implicit, ring
+from thick_bodies import capsule, implicit, ring
 
 from parameterize.skeleton.lattice import lattices
 

@@ -6,8 +6,8 @@ import igl
 import numpy as np
 import pytest
 import trimesh
-from bodies import at_volume_one, capsule, implicit, plate, ring, star, union
 from scipy.spatial import cKDTree
+from thick_bodies import at_volume_one, capsule, implicit, plate, ring, star, union
 
 from parameterize.skeleton.graph import SkeletonError
 from parameterize.skeleton.solid import skeleton_of

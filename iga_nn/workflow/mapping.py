@@ -222,9 +222,11 @@ def _train(
     given: MapInput, expected: Forecast, mapping: MapOptions, progress: ProgressCallback | None, checkpoint: Path
 ) -> Parameterization:
     """Train, and return the map. Raises InputError for a checkpoint of another run, and for corners without paths."""
+    from parameterize.blocks.layout import LayoutError
     from parameterize.checkpoint import CheckpointError
     from parameterize.cube.edge_paths import PathError
     from parameterize.run import parameterize
+    from parameterize.skeleton.graph import SkeletonError
 
     def tell(now: Progress) -> None:
         if progress is not None:
@@ -243,6 +245,8 @@ def _train(
         )
     except CheckpointError as error:
         raise InputError(str(error)) from None
+    except (SkeletonError, LayoutError) as error:
+        raise InputError(f"{given.surface.name}: {error}") from None
     except PathError as error:
         raise InputError(f"{given.surface.name}: {error}; train longer, or give --corners") from None
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Literal
 
-from ..arrays import Array, IntArray
-from ..blocks.layout import BlockLayout, block_layout
+from ..arrays import Array, IntArray, in_brackets
+from ..blocks.layout import BlockLayout, LayoutError, block_layout
 from ..checkpoint import Checkpoints
 from ..coarse import coarse_knots, optimize_coarse_first
 from ..config import Config
@@ -72,7 +72,12 @@ class Task:
     @cached_property
     def skeleton(self) -> Skeleton:
         """Return the skeleton of the solid at volume 1. Raises SkeletonError where it has none."""
-        return skeleton_of(self.surface.unit_vertices, self.surface.faces, self.surface.genus)
+        surface = self.surface
+        return skeleton_of(surface.unit_vertices, surface.faces, surface.genus, self._where)
+
+    def _where(self, point: Array) -> str:
+        """Return a place (3,) at volume 1 in words, in the user's units."""
+        return in_brackets(self.surface.from_unit(point))
 
     @cached_property
     def choice(self) -> Choice:
@@ -94,7 +99,11 @@ class Task:
     @cached_property
     def layout(self) -> BlockLayout:
         """Return thin blocks along the skeleton. Raises SkeletonError and LayoutError where there are none."""
-        return block_layout(self.skeleton, self.surface.unit_vertices, self.surface.faces)
+        surface, most = self.surface, self.config.blocks
+        found = block_layout(self.skeleton, surface.unit_vertices, surface.faces, where=self._where)
+        if most is not None and len(found) > most:
+            raise LayoutError(f"the skeleton needs {len(found)} blocks, and at most {most} are allowed: allow more")
+        return found
 
     @cached_property
     def sphere(self) -> CubeLayout:

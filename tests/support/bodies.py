@@ -1,68 +1,61 @@
-"""Closed surfaces of bodies with handles and limbs, at volume 1, made by marching cubes and by Boolean operations."""
+"""Bodies of several patches by formula for the tests."""
 
-from __future__ import annotations
+from dataclasses import replace
 
 import numpy as np
-import trimesh
-from skimage.measure import marching_cubes
+from rational_shapes import quarter_ring
+from volumes import mapped
+
+from parameterize.spline.multipatch import MultiPatch
+from parameterize.spline.volume import BSplineVolume
 
 
-def at_volume_one(mesh):
-    """Return vertices, faces and genus of a mesh, scaled to volume 1."""
-    assert mesh.is_watertight and mesh.body_count == 1 and mesh.volume > 0.0
-    vertices = np.asarray(mesh.vertices, dtype=np.float64) * mesh.volume ** (-1.0 / 3.0)
-    return vertices, np.asarray(mesh.faces, dtype=np.int64), 1 - mesh.euler_number // 2
+def turned(volume, order=(0, 1, 2), back=(False, False, False)):
+    """The same volume with its parameters in another order, and then some of them reversed."""
+    degrees, knots = (tuple(part[a] for a in order) for part in (volume.degrees, volume.knots))
+    ways = tuple(slice(None, None, -1 if b else 1) for b in back)
+    net = volume.control_points.transpose(*order, 3)[ways]
+    weights = None if volume.weights is None else volume.weights.transpose(order)[ways]
+    knots = tuple(1.0 - k[::-1] if b else k for k, b in zip(knots, back, strict=True))
+    return BSplineVolume(degrees, knots, net, weights)
 
 
-def implicit(function, box, points=48):
-    """Return the surface on which a function of x (3, ...) is 0, negative inside, in the box [-b, b] of three b."""
-    axes = [np.linspace(-b, b, max(8, round(points * b / max(box)))) for b in box]
-    values = function(np.stack(np.meshgrid(*axes, indexing="ij")))
-    vertices, faces, *_ = marching_cubes(values, 0.0, spacing=[axis[1] - axis[0] for axis in axes])
-    mesh = trimesh.Trimesh(vertices - np.asarray(box), faces, process=True)
-    return at_volume_one(max(mesh.split(only_watertight=False), key=lambda piece: piece.volume))
+def row_of(places, turns, degrees=(2, 3, 1), shape=(4, 5, 3)):
+    """Bent boxes at whole places (x, y, z), each turned in its way, glued where they touch.
+
+    All have the same degrees and numbers of control points in x, y and z.
+    """
+
+    def patch(place):
+        def bent(u, v, w):
+            x, y, z = (coordinate + start for coordinate, start in zip((u, v, w), place, strict=True))
+            return x + 0.1 * np.sin(y + z), y + 0.1 * np.sin(z - x), z + 0.05 * np.sin(x * y)
+
+        return mapped(bent, shape, degrees)
+
+    patches = [turned(patch(place), *turn) for place, turn in zip(places, turns, strict=True)]
+    return MultiPatch.from_patches(patches)
 
 
-def from_manifold(solid, length):
-    """Return the surface of a solid of manifold3d, its edges no longer than a length."""
-    mesh = solid.refine_to_length(length).to_mesh()
-    return at_volume_one(trimesh.Trimesh(np.asarray(mesh.vert_properties)[:, :3], np.asarray(mesh.tri_verts)))
+def exact_ring():
+    """A ring with circular walls, of four rational quarters."""
+    quarters, quarter = [], quarter_ring()
+    for number in range(4):
+        turn = np.linalg.matrix_power(np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]), number)
+        quarters.append(replace(quarter, control_points=quarter.control_points @ turn.T))
+    return MultiPatch.from_patches(quarters)
 
 
-def capsule(x, a, b, radius):
-    """Return the distance of points x (3, ...) from the segment a b, less a radius."""
-    a, b = np.asarray(a, dtype=float), np.asarray(b, dtype=float)
-    d = b - a
-    share = np.clip(np.tensordot(d, x - a[:, None, None, None], 1) / (d @ d), 0.0, 1.0)
-    return np.linalg.norm(x - a[:, None, None, None] - d[:, None, None, None] * share, axis=0) - radius
+def ring(patches, shape=(6, 4, 3), degrees=(2, 2, 1), twist=0.0):
+    """A ring of patches around the z axis; the section turns by `twist` half turns on the way."""
 
+    def part(number):
+        def place(u, v, w):
+            angle = 2.0 * np.pi * (u + number) / patches
+            a, b, turn = 0.5 * (v - 0.5), 0.3 * (w - 0.5), 0.5 * twist * angle
+            radius, height = 2.0 + np.cos(turn) * a - np.sin(turn) * b, np.sin(turn) * a + np.cos(turn) * b
+            return radius * np.cos(angle), radius * np.sin(angle), height
 
-def ring(x, center, major, minor):
-    """Return the distance of points x (3, ...) from a circle about the z axis through `center` on x, less a radius."""
-    return np.sqrt((np.hypot(x[0] - center, x[1]) - major) ** 2 + x[2] ** 2) - minor
+        return mapped(place, shape, degrees)
 
-
-def union(*parts, sharpness=14.0):
-    """Return the smooth union of distance functions."""
-    return -np.log(sum(np.exp(-sharpness * part) for part in parts)) / sharpness
-
-
-def plate(holes, size=(6.0, 4.0, 0.8), radius=0.45, length=0.3):
-    """Return a rectangular plate with round holes at the places (x, y)."""
-    from manifold3d import CrossSection
-
-    outline = CrossSection.square(size[:2], True)
-    for place in holes:
-        outline = outline - CrossSection.circle(radius, 24).translate(place)
-    return from_manifold(outline.extrude(size[2]), length)
-
-
-def star(directions, reach=1.6, radius=0.22, ball=0.5):
-    """Return a ball with a round limb in each direction (k, 3)."""
-    limbs = [reach * np.asarray(d, dtype=float) / np.linalg.norm(d) for d in directions]
-    box = [reach + radius + 0.2] * 3
-    return implicit(
-        lambda x: union(np.linalg.norm(x, axis=0) - ball, *(capsule(x, (0, 0, 0), end, radius) for end in limbs)),
-        box,
-        56,
-    )
+    return MultiPatch.from_patches([part(number) for number in range(patches)])
