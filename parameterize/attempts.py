@@ -26,7 +26,7 @@ def starts_of(task: Task) -> tuple[Start, ...]:
     """
     if task.surface.genus and task.config.blocks == 1:
         raise LayoutError(
-            f"genus {task.surface.genus}: no map from one cube onto a body with handles is one-to-one; allow more blocks"
+            f"genus {task.surface.genus}: one cube is never mapped one-to-one onto a body with handles; allow more"
         )
     if task.surface.genus or (task.config.blocks or 1) > 1:
         return (BLOCKS,)
