@@ -14,7 +14,6 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..arrays import Array, Floats, IntArray
-from ..spline.nets import Nets
 from ..spline.sampled_boundary import SampledBoundary
 from ..spline.spline_map import SplineMap
 from ..surface.geometry import vertex_normals
@@ -25,7 +24,6 @@ from .term import RoundWeights
 _GAP = 1e-3  # between sheets, in a domain of volume 1: the check of the boundary proves such a gap
 _WEIGHT = 10.0  # times that of the distance from the surface, whose data hold the sheets where they are
 _SAMPLES = 110  # a direction and face of one cube
-_LEAST_SAMPLES = 16  # the same, in a body of many blocks
 _CANDIDATES = 256  # nearest samples among which one that faces the opposite way is looked for
 _CHUNK = 4096  # samples at a time, which take some 40 MB
 _REACH = 0.05  # distance from a contact, in a domain of volume 1, within which a round's steps look for others
@@ -84,7 +82,7 @@ def contact_penalty(spline: SplineMap, gap: float = _GAP, near: IntArray | None 
     gap: the least distance between two sheets, in units of the map's control points. near: the only samples to be
     examined, from a penalty a few steps before; the examination of all samples takes longer than a Newton step.
     """
-    boundary = SampledBoundary.on(spline.body, *[np.linspace(0.0, 1.0, _samples_a_direction(spline.nets))] * 3)
+    boundary = _sampled(spline)
     normals = vertex_normals(boundary.points, boundary.triangles)
     asked = np.arange(len(boundary.points)) if near is None else near
     touching = asked
@@ -110,9 +108,11 @@ def contact_penalty(spline: SplineMap, gap: float = _GAP, near: IntArray | None 
     )
 
 
-def _samples_a_direction(nets: Nets) -> int:
-    """Return the number of samples a direction and face, in all about as many as the faces of one cube have."""
-    return max(_LEAST_SAMPLES, round(_SAMPLES * (6.0 / np.count_nonzero(nets.exposed)) ** 0.5))
+def _sampled(spline: SplineMap) -> SampledBoundary:
+    """Return samples of the boundary: as many on each face of one cube, a few in each span of several blocks."""
+    if spline.nets.one_cube:
+        return SampledBoundary.on(spline.volume, *[np.linspace(0.0, 1.0, _SAMPLES)] * 3)
+    return SampledBoundary.of(spline.body, samples=2)
 
 
 def _around(points: Array, touching: IntArray) -> IntArray:

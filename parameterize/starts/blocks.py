@@ -13,6 +13,7 @@ from ..arrays import Array
 from ..blocks.layout import Block, BlockLayout
 from ..checkpoint import Checkpoints
 from ..config import Config, scaled_steps
+from ..cube.cutting import subdivide_finely
 from ..optimization.phases import Polish, Schedule, Separate, Unfold
 from ..optimization.reassignment import reassign
 from ..optimization.sliding import SlidingParameters
@@ -25,10 +26,11 @@ from ..surface.geometry import vertex_quadrics, vertex_weights
 from ..threads import one_blas_thread
 from .growth import STEPS, Grow
 from .on_cube import MORE_ROUNDS
-from .start import Attempt, Start, Task, optimized
+from .start import MOST_POINTS, Attempt, Start, Task, optimized
 
 _USUAL_STEPS = (20, 8, 8, 8)  # of Newton's method in the later rounds of most runs: tells the time left
 _SHARES = (1e-3, 1e-2, 0.1)  # of the weight of the surface's data while the faces are drawn to it, round by round
+_LONGEST = 0.055  # length at volume 1 above which the mesh's edges are cut: about a span across a block
 _FAR = 0.2  # root mean square distance from the surface beyond which a folded map is given up
 
 
@@ -75,7 +77,8 @@ def _points(block: Block, rows: list[Array]) -> Array:
 
 def _surface_fit(task: Task, first: SplineMap) -> SurfaceFit:
     """Return the surface's points, each with its first place on the blocks."""
-    points, faces = task.mesh
+    surface = task.surface
+    points, faces = subdivide_finely(surface.unit_vertices, surface.faces, _LONGEST, task.own + MOST_POINTS)
     face = int(np.flatnonzero(first.nets.exposed)[0])  # any: places are assigned at once
     places = np.full((len(points), 3), 0.5)
     places[:, face % 6 // 2] = face % 2
