@@ -93,24 +93,27 @@ class SplineEnergy:
 
         return apply
 
-    def start_round(self, control: Array, penalty: float, share: float | None = None) -> None:
+    def start_round(
+        self, control: Array, penalty: float, share: float | None = None, *, by_faces: bool = False
+    ) -> None:
         """Set the weight of the penalty, the limit of the distortion and the floors of det J for the control points.
 
         share: the share of the weight of the surface's data while F grows into the solid; None where F does not grow.
+        by_faces: whether the faces of F are drawn to the surface in this round, in place of the surface's data.
         """
         self._round = RoundWeights(penalty, self._weights.surface * (1.0 if share is None else share))
         if not self.nets.one_cube:
             self._measure_in(box_lengths(SplineMap(self.nets, control).body))
-            reassign(self.surface, control, first=share is not None)
-            self._approach = None if share is None else faces_towards(self.surface, control)
+            reassign(self.surface, control, first=by_faces)
+            self._approach = faces_towards(self.surface, control) if by_faces else None
         self.distortion.start_round(control, penalty)
         if self._weights.least_floor < 1.0:
             self.determinants.lower_floors(self.distortion.lower_floors(control, self._weights.least_floor))
-        if share is None and not self._grows:
+        if not self.nets.one_cube or (share is None and not self._grows):
             return
         self._grows = share is not None
         self._precondition = self._preconditioner()
-        reach = _REACH if self._grows and self._approach is None else np.inf
+        reach = _REACH if self._grows else np.inf
         self.surface.hold(np.linalg.norm(self.surface.residuals(control), axis=1) > reach)
 
     def watch_facing(self, control: Array) -> None:

@@ -39,11 +39,13 @@ class Phase(ABC):
 
     penalties: the weights of the penalties on det J, one for each round of the stage; later rounds have the last
     weight. firm: the number of rounds of the stage after which the surface's data give way at unproved spans. shares:
-    where F grows, the shares of the weight of the surface's data, one a round. steps: the largest number of Newton
-    steps in a round; None for the number in the options.
+    where F grows, the shares of the weight of the surface's data, one for each round of the stage. steps: the largest
+    number of Newton steps in a round; None for the number in the options. by_faces: whether the faces of F are drawn to
+    the surface, and not the points of the surface draw F.
     """
 
     name: ClassVar[str]
+    by_faces: ClassVar[bool] = False
     penalties: tuple[float, ...] = (FULL_PENALTY,)
     firm: int = FIRM_ROUNDS
     shares: tuple[float, ...] = ()
@@ -217,4 +219,4 @@ class Schedule:
     @property
     def grown(self) -> int:
         """Return the number of rounds in which F grows."""
-        return sum(len(phase.shares) for phase in self.phases)
+        return max(len(phase.shares) for phase in self.phases)

@@ -79,7 +79,8 @@ def _round(state: State, phase: Phase, schedule: Schedule, report: "_StepReport"
     energy, number = state.energy, state.number
     grows, steps = bool(phase.shares), phase.steps or report.most
     phase.begin(state)
-    energy.start_round(state.spline.control, phase.penalty(number), phase.shares[number] if grows else None)
+    share = phase.shares[number] if grows else None
+    energy.start_round(state.spline.control, phase.penalty(number), share, by_faces=phase.by_faces)
     rule = StoppingRule(steps, schedule.gain if number else FIRST_GAIN)
     control = descend(energy, state.spline.control, rule, report)
     found = Optimized.of(state.spline.with_control(control))

@@ -29,9 +29,18 @@ from .on_cube import MORE_ROUNDS
 from .start import MOST_POINTS, Attempt, Start, Task, optimized
 
 _USUAL_STEPS = (20, 8, 8, 8)  # of Newton's method in the later rounds of most runs: tells the time left
-_SHARES = (1e-3, 1e-2, 0.1)  # of the weight of the surface's data while the faces are drawn to it, round by round
+_FACE_SHARES = (1e-3, 1e-2, 0.1)  # of the weight of the surface's data while the faces are drawn to it, round by round
+_POINT_SHARES = (0.01, 0.1)  # the same while the surface's points draw F, before they have all their weight
 _LONGEST = 0.055  # length at volume 1 above which the mesh's edges are cut: about a span across a block
 _FAR = 0.2  # root mean square distance from the surface beyond which a folded map is given up
+
+
+@dataclass(frozen=True)
+class Approach(Grow):
+    """Let the faces of F be drawn to the surface: in each round with a larger share of the weight."""
+
+    name = "approach"
+    by_faces = True
 
 
 @dataclass(frozen=True)
@@ -53,11 +62,14 @@ BLOCKS = AlongSkeleton("blocks", "blocks", "laying blocks along the skeleton")
 def schedule(config: Config) -> Schedule:
     """Return the phases of the rounds: all faces are drawn to the surface at first, then the surface's points draw F.
 
+    Both do so with a growing weight.
+
     Folded maps are not given up for their distance: places are assigned anew in each round.
     """
-    grown, steps = len(_SHARES), scaled_steps(STEPS, config.steps_factor)
-    phases = Grow(shares=_SHARES, steps=steps), Unfold(far=_FAR, far_first=_FAR), Separate(far=_FAR), Polish()
-    return Schedule(phases, grown + config.spline.rounds + MORE_ROUNDS, (steps,) * grown + _USUAL_STEPS)
+    shares, steps = _FACE_SHARES + _POINT_SHARES, scaled_steps(STEPS, config.steps_factor)
+    growing = Approach(shares=_FACE_SHARES, steps=steps), Grow(shares=shares, steps=steps)
+    phases = *growing, Unfold(far=_FAR, far_first=_FAR), Separate(far=_FAR), Polish()
+    return Schedule(phases, len(shares) + config.spline.rounds + MORE_ROUNDS, (steps,) * len(shares) + _USUAL_STEPS)
 
 
 def thin_blocks(layout: BlockLayout, degree: int) -> SplineMap:
