@@ -93,6 +93,7 @@ def _run(mesh: str, output: OutputOptions, mapping: MapOptions, statement: Probl
 @app.command(name="batch")
 def run_many(
     *surfaces: str,
+    split: bool = False,
     output: OutputOptions = OutputOptions(),
     workers: WorkerOptions = WorkerOptions(),
     mapping: MapOptions = MapOptions(),
@@ -105,6 +106,7 @@ def run_many(
 
     Args:
         surfaces: files, folders, patterns in quotes, names of samples and models, or g1 for the set G1.
+        split: take each body of a file with several, as NAME-0, NAME-1 and so on.
     """
     from ..batch.run_batch import run_batch
     from ..report import document as reports
@@ -114,7 +116,7 @@ def run_many(
         raise InputError("batch needs a folder for its results: name it with --out")
     with shown_batch(output.quiet) as progress:
         given = output.folder | {"mapping": mapping, "poisson": poisson, "workers": workers}
-        batch = run_batch(surfaces, progress=progress, **given)
+        batch = run_batch(surfaces, split=split, progress=progress, **given)
     words = f"{batch.summary}\nresults in {batch.folder}"
     _print(reports.as_json(batch.as_dict()) if output.as_json else words)
     return batch_exit_code(batch)
@@ -271,7 +273,7 @@ def check(
         _print(reports.as_json(facts) if as_json else "accepted\n" + answer.surface_in_words(facts))
         return DONE
     if surface != SurfaceOptions() or strict or region or picture:
-        options = "--component, --max-faces, --decimate, --strict, --region and --picture"
+        options = "--component, --close, --max-faces, --decimate, --strict, --region and --picture"
         raise InputError(f"{path}: is a volume; {options} are for surfaces")
     facts = certified_facts(load_volume(path))
     _print(reports.as_json(facts) if as_json else answer.volume_in_words(facts))

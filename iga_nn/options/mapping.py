@@ -19,12 +19,16 @@ class SurfaceOptions(Checked):
     """Hold the options of the surface that is read from a file.
 
     Attributes:
-        component: number of the connected component to use, counted from 0.
+        component: connected component to use, where there are several: its number, 0 has most faces, or "largest", the
+            one of the largest volume.
+        close: fill holes by smooth patches, and say how much area they add; "all" also fills loops longer than a
+            quarter of the box's diagonal, and more than 5 % of the area. It stands behind the surface's name.
         max_faces: refuse surfaces with more faces.
         decimate: reduce surfaces with more faces to max_faces instead; a notice has the distance from the original.
     """
 
-    component: int | None = None
+    component: int | Literal["largest"] | None = None
+    close: bool | Literal["all"] = False
     max_faces: int = 500_000
     decimate: bool = False
 
