@@ -39,26 +39,30 @@ def resolve(
     *,
     component: Choice = None,
     close: Close = False,
+    deflection: float | None = None,
     max_faces: int = MAX_FACES,
     decimate: bool = False,
 ) -> Surface:
     """Return the surface that MESH names: a file, else a sample, else a model in the folder IGA_NN_DATA.
 
-    component, close, max_faces: as in load_surface. decimate: reduce a larger surface to max_faces instead of refusing
-    it. Raises MeshError with the way to get a missing file.
+    component, close, deflection, max_faces: as in load_surface. decimate: reduce a larger surface to max_faces instead
+    of refusing it. Raises MeshError with the way to get a missing file.
     """
+    how: dict[str, Any] = {"component": component, "close": close, "deflection": deflection}
     if decimate:
         from parameterize.surface import decimation
 
-        larger = resolve(name, component=component, close=close, max_faces=max(max_faces, MAX_FACES))
+        larger = resolve(name, max_faces=max(max_faces, MAX_FACES), **how)
         return decimation.decimate(larger, max_faces)
-    asked: dict[str, Any] = {"component": component, "close": close, "max_faces": max_faces}
+    asked = {**how, "max_faces": max_faces}
     if not name:
         raise MeshError("no surface is named: give a file, or one of the samples " + ", ".join(SAMPLES))
     if Path(name).is_file():
         return load_surface(name, **asked)
     if name in SAMPLES:  # before folders: the results of a sample are in a folder of its name
-        return surface_from_arrays(*SAMPLES[name](), name, **asked)
+        if deflection is not None:
+            raise MeshError(f"{name}: deflection is for files of solid models: leave --deflection out")
+        return surface_from_arrays(*SAMPLES[name](), name, component=component, close=close, max_faces=max_faces)
     if found := _in_data_folder(name):
         return load_surface(found, **asked)
     if Path(name).exists() and Path(name).name.split(".")[0] not in MODELS:

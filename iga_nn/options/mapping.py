@@ -23,12 +23,15 @@ class SurfaceOptions(Checked):
             one of the largest volume.
         close: fill holes by smooth patches, and say how much area they add; "all" also fills loops longer than a
             quarter of the box's diagonal, and more than 5 % of the area. It stands behind the surface's name.
+        deflection: of a solid model (STEP, IGES), the largest distance of the triangles from its curved faces, in the
+            file's unit; a thousandth of the box's diagonal by default.
         max_faces: refuse surfaces with more faces.
         decimate: reduce surfaces with more faces to max_faces instead; a notice has the distance from the original.
     """
 
     component: int | Literal["largest"] | None = None
     close: bool | Literal["all"] = False
+    deflection: float | None = None
     max_faces: int = 500_000
     decimate: bool = False
 

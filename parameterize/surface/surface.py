@@ -71,6 +71,8 @@ class Surface(Brief, Shown):
     groups : dict of str to array of int
         The faces of each group of the input, ascending: OBJ groups, materials and objects, STL solids, physical groups
         of Gmsh, whole numbers given with faces. A face may be in several.
+    unit : str
+        Of lengths, where the file has one, such as mm.
 
     Examples
     --------
@@ -93,6 +95,7 @@ class Surface(Brief, Shown):
     unit_vertices: Array
     crossings: IntArray
     groups: Groups
+    unit: str = ""
 
     def to_unit(self, points: ArrayLike) -> Array:
         """Return points (..., 3) in the user's units as placed points."""
@@ -128,6 +131,7 @@ class Surface(Brief, Shown):
             "faces": len(self.faces),
             "volume": self.volume,
             "bbox": [corner.tolist() for corner in self.bbox],
+            **({"unit": self.unit} if self.unit else {}),
             "self_intersections": {
                 "pairs": len(self.crossings),
                 "first": [
@@ -154,6 +158,7 @@ def load_surface(
     *,
     component: Choice = None,
     close: Close = False,
+    deflection: float | None = None,
     max_faces: int = MAX_FACES,
 ) -> Surface:
     """Return the surface of a file or of a mesh of trimesh, pyvista or meshio, checked and repaired.
@@ -161,13 +166,17 @@ def load_surface(
     Parameters
     ----------
     mesh : str or Path, or a trimesh.Trimesh, pyvista.PolyData or meshio.Mesh
-        The path of a surface (.obj, .stl, .ply, .off) or of cells (.mesh, .msh, .vtu), each also as .gz, or a mesh in
-        memory. Of solid cells the boundary is taken.
+        The path of a surface (.obj, .stl, .ply, .off, .glb, .gltf, .3mf, .vtp), of cells (.mesh, .msh, .vtu, .vtk) or
+        of a solid model (.step, .iges, with the extra `cad`), each also as .gz or .zip, or a mesh in memory. Of solid
+        cells the boundary is taken.
     component : int or "largest", optional
         The component to take where there are several: 0 has most faces, "largest" encloses most volume.
     close : bool or "all"
         Fill holes by smooth patches; "all" also those longer than a quarter of the box's diagonal, or of more than 5 %
         of the area.
+    deflection : float, optional
+        Of a solid model: largest distance of the triangles from curved faces, in the file's unit; a thousandth of the
+        box's diagonal by default.
     max_faces : int
         A surface with more faces is refused.
 
@@ -207,7 +216,7 @@ def load_surface(
         else:
             path = Path(source)
             name = path.name.split(".")[0] or path.name
-            surface = _gate(read_mesh(path, max_faces), name, source, asked)
+            surface = _gate(read_mesh(path, max_faces, deflection), name, source, asked)
     except MeshError as error:
         raise MeshError(f"{source}: {error}") from None
     logger.debug("%s: %d vertices, %d faces", source, len(surface.vertices), len(surface.faces))
@@ -318,4 +327,5 @@ def _gate(raw: RawMesh, name: str, source: str, asked: Asked) -> Surface:
         unit_vertices=placed.astype(np.float32).astype(np.float64),
         crossings=crossings,
         groups=renumbered(raw.groups, draft.old),
+        unit=raw.unit,
     )

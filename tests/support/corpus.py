@@ -130,11 +130,11 @@ def shapes():
 
 def files():
     """What is no defect of a surface: archives, limits, choices."""
-    yield "cube.zip", refused(_archive(), "unpack what is in it first")
+    yield "cube.zip", accepted(_archive(), "unpacked '../../cube.obj' from .zip")
     yield "zipped.obj", refused(_archive(), "unpack what is in it first")
     yield "zipped.npz", refused(_archive(), "has no array named")
-    yield "scene.gltf", refused('{"asset": {"version": "2.0"}}', "unknown format: expected")
-    yield "model.3mf", refused(_archive(), "unknown format: expected")
+    yield "scene.gltf", refused('{"asset": {"version": "2.0"}}', "has no triangles")
+    yield "archive.3mf", refused(_archive(), "the archive has no 3D model")
     yield "limit.obj", accepted(obj(faces=TRIANGLES), "", "--max-faces", "12")
     yield "over.obj", refused(obj(faces=TRIANGLES), "12 faces, more than max_faces=11", "--max-faces", "11")
     yield "over.stl", refused(binary_stl(), "12 faces, more than max_faces=11", "--max-faces", "11")
