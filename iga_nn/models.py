@@ -15,6 +15,7 @@ from .errors import InputError, did_you_mean
 from .new_file import check_new, save_new
 from .samples import SAMPLES, obj_text
 
+MOST_READ = 2_000_000  # faces: reading them takes some 2 GB of memory
 DATA_FOLDER = "IGA_NN_DATA"
 SET = "g1"  # names a set of models
 RAW = "https://raw.githubusercontent.com"
@@ -45,14 +46,15 @@ def resolve(
 ) -> Surface:
     """Return the surface that MESH names: a file, else a sample, else a model in the folder IGA_NN_DATA.
 
-    component, close, deflection, max_faces: as in load_surface. decimate: reduce a larger surface to max_faces instead
-    of refusing it. Raises MeshError with the way to get a missing file.
+    component, close, deflection, max_faces: as in load_surface. decimate: reduce a larger surface, of at most MOST_READ
+    faces, to max_faces instead of refusing it; where max_faces is MAX_FACES, as by default, that is done anyway, with a
+    notice. Raises MeshError with the way to get a missing file.
     """
     how: dict[str, Any] = {"component": component, "close": close, "deflection": deflection}
-    if decimate:
+    if decimate or max_faces == MAX_FACES:
         from parameterize.surface import decimation
 
-        larger = resolve(name, max_faces=max(max_faces, MAX_FACES), **how)
+        larger = resolve(name, max_faces=max(max_faces, MOST_READ), **how)
         return decimation.decimate(larger, max_faces)
     asked = {**how, "max_faces": max_faces}
     if not name:

@@ -25,7 +25,7 @@ class SurfaceOptions(Checked):
             quarter of the box's diagonal, and more than 5 % of the area. It stands behind the surface's name.
         deflection: of a solid model (STEP, IGES), the largest distance of the triangles from its curved faces, in the
             file's unit; a thousandth of the box's diagonal by default.
-        max_faces: refuse surfaces with more faces.
+        max_faces: refuse surfaces with more faces; where it is not given, reduce them to 500 000, as decimate does.
         decimate: reduce surfaces with more faces to max_faces instead; a notice has the distance from the original.
     """
 

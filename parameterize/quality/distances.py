@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..arrays import Array
+from ..arrays import Array, IntArray
 from ..cube.cube import axis_and_side, damped_fit, tangent_axes
 from ..spline.sampled_boundary import SampledBoundary
 from ..spline.volume import BSplineVolume
@@ -50,8 +50,16 @@ def nearest_on_boundary(points: Array, volume: BSplineVolume, boundary: SampledB
     corners = boundary.triangles[triangle]  # (m, 3)
     where = np.einsum("mk,mka->ma", weights, boundary.parameters[corners])
     axis, _ = axis_and_side(boundary.cube_faces[triangle])
-    active = np.arange(len(points))
-    where[active, axis] = boundary.parameters[corners[:, 0], axis]
+    where[np.arange(len(points)), axis] = boundary.parameters[corners[:, 0], axis]
+    return closest_in_faces(points, volume, where, axis)
+
+
+def closest_in_faces(points: Array, volume: BSplineVolume, start: Array, axis: IntArray) -> tuple[Array, Array]:
+    """Return parameters (m, 3) near `start` whose values are closer to points (m, 3), and the distances (m,).
+
+    axis: (m,), the direction that is constant on the cube face of each start. Parameters stay on that face.
+    """
+    where, active = start.copy(), np.arange(len(points))
     best: Array = np.linalg.norm(volume(where) - points, axis=1)
     for _ in range(_NEWTON_STEPS):
         trial, (a, b), rows = where[active], tangent_axes(axis[active]), np.arange(len(active))

@@ -120,6 +120,13 @@ class Surface(Brief, Shown):
         """Return the mesh whose triangles are found by group, by a nearby point, or up to sharp edges."""
         return PartSurface(self.vertices, self.faces, self.groups)
 
+    @cached_property
+    def fitted(self) -> "tuple[Surface, str]":
+        """Return the surface that maps are laid out and fitted on, and a notice; itself, and "", unless it is large."""
+        from .decimation import fitted_copy
+
+        return fitted_copy(self)
+
     def summary(self) -> dict[str, Any]:
         """Return the section `input` of report.json."""
         first = self.crossings[: topology.SHOWN]
