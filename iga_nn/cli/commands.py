@@ -27,7 +27,7 @@ from ..options import (
 )
 from ..version import __version__
 from . import BAD_INPUT, DONE, INTERRUPTED, NOT_CERTIFIED, NOT_SOLVED
-from .arguments import Json, Mesh, Mpi, ObjFile, OutputOptions, Overwrite, PageOptions, Volume, converted
+from .arguments import Json, Mesh, Mpi, ObjFile, OutputOptions, Overwrite, PageOptions, Volume, converted, with_values
 from .progress import shown_batch, shown_progress
 from .refusal import refusal
 
@@ -386,7 +386,7 @@ def main(argv: list[str]) -> int:
     """Run one command and return its exit code; only an internal error shows a traceback."""
     try:
         with _processes(argv):
-            code = app(argv, exit_on_error=False, print_error=False, result_action="return_value")
+            code = app(with_values(argv), exit_on_error=False, print_error=False, result_action="return_value")
     except KeyboardInterrupt as error:  # its message has the command that continues, where there is one
         print(f"iga-nn: {str(error) or 'interrupted'}", file=sys.stderr)
         return INTERRUPTED

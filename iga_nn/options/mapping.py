@@ -22,7 +22,7 @@ class SurfaceOptions(Checked):
         component: connected component to use, where there are several: its number, 0 has most faces, or "largest", the
             one of the largest volume.
         close: fill holes by smooth patches, and say how much area they add; "all" also fills loops longer than a
-            quarter of the box's diagonal, and more than 5 % of the area. It stands behind the surface's name.
+            quarter of the box's diagonal, and more than 5 % of the area.
         deflection: of a solid model (STEP, IGES), the largest distance of the triangles from its curved faces, in the
             file's unit; a thousandth of the box's diagonal by default.
         max_faces: refuse surfaces with more faces; where it is not given, reduce them to 500 000, as decimate does.
