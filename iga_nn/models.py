@@ -5,13 +5,17 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
+from typing import Any
 
+from parameterize.surface.bodies import Choice
+from parameterize.surface.holes import Close
 from parameterize.surface.surface import MAX_FACES, MeshError, Surface, load_surface, surface_from_arrays
 
 from .errors import InputError, did_you_mean
 from .new_file import check_new, save_new
 from .samples import SAMPLES, obj_text
 
+MOST_READ = 2_000_000  # faces: reading them takes some 2 GB of memory
 DATA_FOLDER = "IGA_NN_DATA"
 SET = "g1"  # names a set of models
 RAW = "https://raw.githubusercontent.com"
@@ -31,27 +35,40 @@ _PUBLISHED = [Model(*row.split()) for row in _ROWS if not row.startswith("#")]
 MODELS = {Path(model.path).stem: model for model in _PUBLISHED}
 
 
-def resolve(name: str, *, component: int | None = None, max_faces: int = MAX_FACES, decimate: bool = False) -> Surface:
+def resolve(
+    name: str,
+    *,
+    component: Choice = None,
+    close: Close = False,
+    deflection: float | None = None,
+    max_faces: int = MAX_FACES,
+    decimate: bool = False,
+) -> Surface:
     """Return the surface that MESH names: a file, else a sample, else a model in the folder IGA_NN_DATA.
 
-    component, max_faces: as in load_surface. decimate: reduce a larger surface to max_faces instead of refusing it.
-    Raises MeshError with the way to get a missing file.
+    component, close, deflection, max_faces: as in load_surface. decimate: reduce a larger surface, of at most MOST_READ
+    faces, to max_faces instead of refusing it; where max_faces is MAX_FACES, as by default, that is done anyway, with a
+    notice. Raises MeshError with the way to get a missing file.
     """
-    if decimate:
+    how: dict[str, Any] = {"component": component, "close": close, "deflection": deflection}
+    if decimate or max_faces == MAX_FACES:
         from parameterize.surface import decimation
 
-        larger = resolve(name, component=component, max_faces=max(max_faces, MAX_FACES))
+        larger = resolve(name, max_faces=max(max_faces, MOST_READ), **how)
         return decimation.decimate(larger, max_faces)
+    asked = {**how, "max_faces": max_faces}
     if not name:
         raise MeshError("no surface is named: give a file, or one of the samples " + ", ".join(SAMPLES))
     if Path(name).is_file():
-        return load_surface(name, component=component, max_faces=max_faces)
+        return load_surface(name, **asked)
     if name in SAMPLES:  # before folders: the results of a sample are in a folder of its name
-        return surface_from_arrays(*SAMPLES[name](), name, component=component, max_faces=max_faces)
+        if deflection is not None:
+            raise MeshError(f"{name}: deflection is for files of solid models: leave --deflection out")
+        return surface_from_arrays(*SAMPLES[name](), name, component=component, close=close, max_faces=max_faces)
     if found := _in_data_folder(name):
-        return load_surface(found, component=component, max_faces=max_faces)
+        return load_surface(found, **asked)
     if Path(name).exists() and Path(name).name.split(".")[0] not in MODELS:
-        return load_surface(name, component=component, max_faces=max_faces)
+        return load_surface(name, **asked)
     raise not_found(name)
 
 

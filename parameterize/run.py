@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from .arrays import IntArray
 from .attempts import attempts
+from .carrying import carried
 from .certificate.body import BodyCertificate, certify
 from .certificate.boundary import check_boundary
 from .certificate.jacobian import Certificate
@@ -163,7 +164,10 @@ def parameterize(
     checkpoints = Checkpoints(None if checkpoint_dir is None else Path(checkpoint_dir), identity, resume=resume)
     history, seconds = History(), dict[str, float]()
     report: dict[str, Any] = {"history": history, "progress": progress or ignore}
-    task = Task(surface, config, seed, place, dtype, given, seconds, report)
+    with timed(seconds, "fit"):
+        copy, _ = surface.fitted
+        held = given if given is None or copy is surface else corner_vertices(copy, surface.vertices[given])
+    task = Task(copy, config, seed, place, dtype, held, seconds, report)
     tried = attempts(task, checkpoints)
     best = best_of(tried)
     assert best is not None  # the last start that is tried makes a map of any shape
@@ -175,6 +179,8 @@ def parameterize(
             found, fit, told = refine(found, fit, *options, checkpoints=checkpoints, **report)
     with timed(seconds, "optimize"):
         volume, boundary = _in_users_units(found, fit, task)
+        if copy is not surface:
+            boundary = carried(boundary, volume, surface)
     with timed(seconds, "certify"):
         certificate = certify(volume)  # of the volume in the user's units: bringing it there rounds
         proofs = certificate, check_boundary(volume)

@@ -136,6 +136,21 @@ def test_a_batch_survives_what_happens_to_it(tmp_path):
     assert {path.name for path in tmp_path.iterdir()} == {"parts", "out", "scratch", "stdout", "stderr"}
 
 
+def test_each_body_of_a_file_has_a_row_of_its_own(formula_training, in_this_process, in_folder, capsys):
+    formula_training()
+    moved = CUBE + [3.0, 0.0, 0.0]
+    Path("pair.obj").write_text(obj([*CUBE, *moved], [*TRIANGLES, *(TRIANGLES + 8)]))
+    assert main(["batch", "pair.obj", "--split", "--refine", "0", "--out", "out", "--quiet"]) == 0
+    rows = json.loads(Path("out", "batch.json").read_text())["surfaces"]
+    assert [row["surface"] for row in rows] == ["pair.obj-0", "pair.obj-1"]
+    for number in (0, 1):
+        report = json.loads(Path("out", f"pair-{number}", "report.json").read_text())
+        assert f"--component {number}" in report["command"]
+        assert report["input"]["bbox"][0] == [3.0 * number, 0.0, 0.0]
+    assert main(["batch", "pair.obj", "--split", "--component", "0", "--out", "out"]) == 2
+    assert "split takes every component: leave --component out" in capsys.readouterr().err
+
+
 def test_what_was_refused_or_failed_is_run_again_alone(formula_training, in_this_process, in_folder, capsys):
     Path("parts").mkdir()
     for name in ("done", "failed"):

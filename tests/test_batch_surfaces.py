@@ -5,9 +5,9 @@ import os
 from pathlib import Path
 
 import pytest
-from mesh_files import obj
+from mesh_files import ball, joined, obj
 
-from iga_nn.batch.surfaces import distinct_folders, entries_of
+from iga_nn.batch.surfaces import distinct_folders, divided, entries_of
 from iga_nn.errors import InputError
 from iga_nn.models import in_set
 
@@ -81,3 +81,17 @@ def test_odd_names(in_folder):
     found = entries_of(odd, Path("out"))
     assert [entry.folder.name for entry in found] == [name.removesuffix(".obj") for name in odd]
     assert [entry.name for entry in found[-2:]] == ["line\\nbreak.obj", "latin\\udce9.obj"]  # written everywhere
+
+
+def test_each_body_of_a_file_has_an_entry_of_its_own(in_folder):
+    Path("pair.obj").write_text(obj(*joined(ball(2.0), ball(), ball(subdivisions=1, center=(5, 0, 0)))))
+    Path("pair-2.obj").write_text(obj())
+    Path("none.obj").write_text("hello\n")
+    found = divided(entries_of(["pair.obj", "pair-2.obj", "none.obj", "bean"], Path("out")), 1000)
+    assert [(entry.name, entry.folder.name, number) for entry, number in found] == [
+        ("pair.obj-0", "pair-0", 0),
+        ("pair.obj-2", "pair-2", 2),
+        ("pair-2.obj", "pair-2-2", None),
+        ("none.obj", "none", None),
+        ("bean", "bean", None),
+    ]

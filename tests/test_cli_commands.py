@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from mesh_files import CUBE, obj
+from mesh_files import CUBE, ball, obj
 
 import iga_nn
 import solve
@@ -694,3 +694,11 @@ def test_an_interruption_in_the_middle_of_a_training_leaves_a_checkpoint(
     assert ended.value.code == 130 and len(steps) == 8
     assert "--resume" in one_line(capsys.readouterr().err)
     assert any(Path("bean/checkpoint").iterdir())
+
+
+@pytest.mark.parametrize("words", [["--close", "open.obj"], ["open.obj", "--close"], ["open.obj", "--close", "all"]])
+def test_close_may_stand_before_the_name_and_takes_all(words, in_folder, capsys):
+    vertices, faces = ball(subdivisions=3)
+    Path("open.obj").write_text(obj(vertices, faces[1:]))
+    assert main(["check", *words]) == 0
+    assert "closed 1 boundary loop" in capsys.readouterr().out

@@ -222,3 +222,11 @@ def test_the_conch_at_hand_is_the_published_one():
     if not path.is_file():
         pytest.skip("no conch.obj in the folder of models")
     assert hashlib.sha256(path.read_bytes()).hexdigest() == MODELS["conch"].sha256
+
+
+def test_a_surface_above_the_default_limit_is_reduced_with_a_notice(monkeypatch, an_empty_folder):
+    monkeypatch.setattr("iga_nn.models.MAX_FACES", 2000)
+    surface = resolve("bean", max_faces=2000)
+    assert len(surface.faces) <= 2000 and surface.notices[0].startswith("decimated from 4996 to 2000 faces: moved by")
+    with pytest.raises(MeshError, match="4996 faces, more than max_faces=1000"):
+        resolve("bean", max_faces=1000)

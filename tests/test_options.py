@@ -85,7 +85,7 @@ def test_auto_takes_its_limits_to_the_map():
         ({"control_points": "many"}, "control points: must be a whole number or 'auto', got 'many'"),
         ({"seed": True}, "seed: must be a whole number, got True"),
         ({"steps_factor": None}, "steps factor: must be a number, got None"),
-        ({"component": "x"}, "component: must be a whole number or None, got 'x'"),
+        ({"component": "x"}, "component: must be a whole number or 'largest' or None, got 'x'"),
         ({"max_faces": "x"}, "max faces: must be a whole number, got 'x'"),
         ({"corners": [1, 2]}, "corners: must be a path or None, got .1, 2."),
         ({"max_control_points": 40}, "max control points: requires --control-points auto"),

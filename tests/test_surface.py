@@ -175,7 +175,10 @@ def test_refuses_genus_one():
 
 def test_lists_components_and_takes_the_one_asked_for():
     pair = joined(ball(subdivisions=1), ball(2.0, (5, 0, 0)))
-    with pytest.raises(MeshError, match=r"2 components \(0: 320 faces, 1: 80 faces\): choose one with --component N"):
+    with pytest.raises(
+        MeshError,
+        match=r"2 components \(0: 320 faces, 1: 80 faces\): choose one with --component largest or --component N",
+    ):
         surface_from_arrays(*pair)
     small = surface_from_arrays(*pair, component=1)
     assert len(small.faces) == 80
@@ -197,21 +200,16 @@ def test_the_shell_inside_may_have_more_faces():
         surface_from_arrays(*joined(outer, (vertices, faces[:, ::-1])))
 
 
-def test_refuses_a_pinched_vertex():
-    vertices, faces = TETRAHEDRON
-    pinched = np.concatenate([faces, np.where(faces == 0, 0, faces + 3)])
-    with pytest.raises(MeshError, match=r"1 non-manifold vertices .* the first at \(0, 0, 0\)"):
-        surface_from_arrays(np.vstack([vertices, -vertices[1:]]), pinched)
-
-
 def test_touching_sheets_of_a_closed_mesh_are_not_welded():
-    """Two vertices in one place are no defect where the numbering keeps the sheets apart."""
+    """Two vertices in one place are no defect; where the numbering joins them, they are split into two again."""
     vertices, faces = ball(subdivisions=3)
     north, south = np.argmax(vertices[:, 2]), np.argmin(vertices[:, 2])
     vertices[north] = vertices[south] = 0.0  # two dents that meet in the centre
-    with pytest.raises(MeshError, match="non-manifold"):
-        surface_from_arrays(vertices, np.where(faces == south, north, faces))
-    assert len(surface_from_arrays(vertices, faces).vertices) == len(vertices)
+    apart = surface_from_arrays(vertices, faces)
+    assert len(apart.vertices) == len(vertices)
+    joined_there = surface_from_arrays(vertices, np.where(faces == south, north, faces))
+    assert len(joined_there.vertices) == len(vertices) and joined_there.volume == pytest.approx(apart.volume)
+    assert any("split 1 vertex where sheets touch, the first at (0, 0, 0)" in line for line in joined_there.notices)
 
 
 def test_collapses_edges_without_length():
@@ -458,7 +456,9 @@ def test_a_path_that_is_none_is_refused_with_the_remedy():
     [
         ({"max_faces": "9"}, "max_faces must be a whole number, at least 4, got '9'"),
         ({"max_faces": float("nan")}, "max_faces must be a whole number, at least 4, got nan"),
-        ({"component": "0"}, "component must be a whole number, counted from 0, got '0'"),
+        ({"component": "0"}, "component must be a whole number, counted from 0, or 'largest', got '0'"),
+        ({"component": -1}, "component must be a whole number, counted from 0, or 'largest', got -1"),
+        ({"close": "some"}, "close must be True, False or 'all', got 'some'"),
     ],
 )
 def test_limits_of_another_kind_are_refused(given, says):

@@ -18,7 +18,7 @@ from ..workflow import pipeline
 from ..workflow.cost_estimate import warn_of_memory
 from ..workflow.output_folder import forget, locked, new_folder, writable
 from ..workflow.worker_run import Ended
-from .surfaces import demand_one, entries_of
+from .surfaces import demand_one, divided, entries_of
 from .table import Batch, Row, page
 from .task import Task, Work, compute
 
@@ -49,6 +49,7 @@ def run_batch(
     mapping: MapOptions | None = None,
     poisson: PoissonOptions | None = None,
     workers: WorkerOptions | None = None,
+    split: bool = False,
     force: bool = False,
     vector: bool = False,
     progress: Progress | None = None,
@@ -71,6 +72,9 @@ def run_batch(
         The problem that is solved on each.
     workers : WorkerOptions, optional
         Options of the worker processes; two of this machine by default.
+    split : bool
+        Take each body of a file with several, as NAME-0, NAME-1 and so on; one inside another is a cavity, which is
+        filled.
     force : bool
         Start all surfaces anew.
     vector : bool
@@ -111,6 +115,7 @@ def run_batch(
         ("mapping", mapping, MapOptions),
         ("poisson", statement, PoissonOptions),
         ("workers", workers, WorkerOptions),
+        ("split", split, bool),
         ("progress", progress, Callable | None),
     ):
         check_type(name, value, kind)
@@ -121,7 +126,14 @@ def run_batch(
     common = replace(mapping, corners=corners, resume=True)
     entries = entries_of([str(surface) for surface in surfaces], Path(out))
     demand_one(entries)
-    tasks = [Task(entry.name, entry.mesh, entry.folder, common, statement, vector) for entry in entries]
+    if split and mapping.component is not None:
+        raise InputError("split takes every component: leave --component out")
+    tasks = [
+        Task(entry.name, entry.mesh, entry.folder, replace(common, component=number), statement, vector)
+        for entry, number in (
+            divided(entries, mapping.max_faces) if split else [(entry, mapping.component) for entry in entries]
+        )
+    ]
     return run_tasks(Path(out), tasks, workers, force=force, progress=progress)
 
 

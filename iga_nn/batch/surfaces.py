@@ -3,10 +3,11 @@
 import glob
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from parameterize.surface.readers.file import FORMATS
+from parameterize.surface.surface import MeshError, bodies_in
 
 from ..errors import InputError
 from ..models import MODELS, SET, in_set, not_found
@@ -43,6 +44,28 @@ def entries_of(surfaces: Sequence[str], out: Path) -> list[Entry]:
     return [
         Entry(printable(name), mesh, out.absolute() / folder)
         for name, mesh, folder in zip(found.values(), meshes, distinct_folders(meshes), strict=True)
+    ]
+
+
+def divided(entries: Sequence[Entry], max_faces: int) -> list[tuple[Entry, int | None]]:
+    """Return an entry, NAME-0, NAME-1 and so on, and the number of its component for each body of the entries' files.
+
+    A file of one component stays as it is, and so does one that is refused: the run says why.
+    """
+    found: list[tuple[Entry, int | None]] = []
+    for entry in entries:
+        try:
+            numbers = bodies_in(Path(entry.mesh), max_faces) if Path(entry.mesh).is_file() else [None]
+        except MeshError:
+            numbers = [None]
+        for number in numbers:
+            ending = "" if number is None else f"-{number}"
+            folder = entry.folder.with_name(entry.folder.name + ending)
+            found.append((replace(entry, name=entry.name + ending, folder=folder), number))
+    folders = _numbered([entry.folder.name for entry, _ in found])
+    return [
+        (replace(entry, folder=entry.folder.with_name(folder)), number)
+        for (entry, number), folder in zip(found, folders, strict=True)
     ]
 
 

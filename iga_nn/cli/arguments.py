@@ -19,6 +19,15 @@ def converted(kind: Any, tokens: Sequence[Token]) -> Any:
     return convert(kind, tokens)
 
 
+def with_values(argv: Sequence[str]) -> list[str]:
+    """Return the words of a command line with the value of a --close that has none, so that a name may follow it."""
+    words = list(argv)
+    for place, word in enumerate(words):
+        if word == "--close" and words[place + 1 : place + 2] != ["all"]:
+            words[place] = "--close=true"
+    return words
+
+
 Mesh = Annotated[str, Parameter(help="path of a closed surface, or the name of a sample or a model.")]
 Volume = Annotated[
     Path,

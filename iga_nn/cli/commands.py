@@ -27,7 +27,7 @@ from ..options import (
 )
 from ..version import __version__
 from . import BAD_INPUT, DONE, INTERRUPTED, NOT_CERTIFIED, NOT_SOLVED
-from .arguments import Json, Mesh, Mpi, ObjFile, OutputOptions, Overwrite, PageOptions, Volume, converted
+from .arguments import Json, Mesh, Mpi, ObjFile, OutputOptions, Overwrite, PageOptions, Volume, converted, with_values
 from .progress import shown_batch, shown_progress
 from .refusal import refusal
 
@@ -93,6 +93,7 @@ def _run(mesh: str, output: OutputOptions, mapping: MapOptions, statement: Probl
 @app.command(name="batch")
 def run_many(
     *surfaces: str,
+    split: bool = False,
     output: OutputOptions = OutputOptions(),
     workers: WorkerOptions = WorkerOptions(),
     mapping: MapOptions = MapOptions(),
@@ -105,6 +106,7 @@ def run_many(
 
     Args:
         surfaces: files, folders, patterns in quotes, names of samples and models, or g1 for the set G1.
+        split: take each body of a file with several, as NAME-0, NAME-1 and so on.
     """
     from ..batch.run_batch import run_batch
     from ..report import document as reports
@@ -114,7 +116,7 @@ def run_many(
         raise InputError("batch needs a folder for its results: name it with --out")
     with shown_batch(output.quiet) as progress:
         given = output.folder | {"mapping": mapping, "poisson": poisson, "workers": workers}
-        batch = run_batch(surfaces, progress=progress, **given)
+        batch = run_batch(surfaces, split=split, progress=progress, **given)
     words = f"{batch.summary}\nresults in {batch.folder}"
     _print(reports.as_json(batch.as_dict()) if output.as_json else words)
     return batch_exit_code(batch)
@@ -271,7 +273,7 @@ def check(
         _print(reports.as_json(facts) if as_json else "accepted\n" + answer.surface_in_words(facts))
         return DONE
     if surface != SurfaceOptions() or strict or region or picture:
-        options = "--component, --max-faces, --decimate, --strict, --region and --picture"
+        options = "--component, --close, --deflection, --max-faces, --decimate, --strict, --region and --picture"
         raise InputError(f"{path}: is a volume; {options} are for surfaces")
     facts = certified_facts(load_volume(path))
     _print(reports.as_json(facts) if as_json else answer.volume_in_words(facts))
@@ -384,7 +386,7 @@ def main(argv: list[str]) -> int:
     """Run one command and return its exit code; only an internal error shows a traceback."""
     try:
         with _processes(argv):
-            code = app(argv, exit_on_error=False, print_error=False, result_action="return_value")
+            code = app(with_values(argv), exit_on_error=False, print_error=False, result_action="return_value")
     except KeyboardInterrupt as error:  # its message has the command that continues, where there is one
         print(f"iga-nn: {str(error) or 'interrupted'}", file=sys.stderr)
         return INTERRUPTED

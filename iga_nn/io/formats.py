@@ -9,6 +9,7 @@ for ParaView. IGES and STEP have no trivariate splines.
 """
 
 import logging
+import zipfile
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
@@ -36,6 +37,7 @@ from .reading import ENDINGS, READERS, kind_of, read_body
 log = logging.getLogger(__name__)
 
 SHOWN = 3  # pairs of faces in a notice
+ALIKE = (".gltf", ".3mf")  # surfaces that begin as volumes do
 NARROWEST = 1e-100  # knot span: with the largest control points, derivatives stay within double precision
 
 
@@ -65,14 +67,26 @@ FORMATS = {
 def is_volume(path: str | Path) -> bool:
     """Return whether a file is a volume (rather than a surface), by its ending .npz or by its beginning.
 
-    Files of other programs begin alike (glTF as JSON, 3MF as a ZIP archive), so the ending must be one that is read
-    here, for a volume or for a surface; a volume may be in a .zip, too.
+    Surfaces begin alike (glTF as JSON, 3MF as a ZIP archive), so the ending must be one that is read here, for a volume
+    or for a surface that does not; a .zip is a volume where it holds arrays.
     """
     source = Path(path)
-    endings = ("", ".zip", *ENDINGS.values(), *SURFACES)
-    return source.suffix == ".npz" or (
-        source.suffix.lower() in endings and source.is_file() and kind_of(source) is not None
-    )
+    suffix = source.suffix.lower()
+    endings = ("", ".zip", *ENDINGS.values(), *(ending for ending in SURFACES if ending not in ALIKE))
+    if suffix == ".npz":
+        return True
+    if suffix not in endings or not source.is_file() or kind_of(source) is None:
+        return False
+    return suffix != ".zip" or _holds_arrays(source)
+
+
+def _holds_arrays(path: Path) -> bool:
+    """Return whether an archive is one of numpy's."""
+    try:
+        with zipfile.ZipFile(path) as archive:
+            return any(name.endswith(".npy") for name in archive.namelist())
+    except (zipfile.BadZipFile, OSError, ValueError, NotImplementedError):
+        return False
 
 
 def load_volume(path: str | Path, tolerance: float = TOLERANCE) -> BSplineVolume | MultiPatch:

@@ -110,7 +110,8 @@ class Page:
     # Jobs
 
     def _check(self, path: Path) -> Surface:
-        return resolve(str(path), **self._mapping.reading())
+        surface, notice = resolve(str(path), **self._mapping.reading()).fitted  # what the browser draws, too
+        return replace(surface, notices=(*surface.notices, *filter(None, [notice])))
 
     def _run(self, job: Job) -> Iterator[Message]:
         mapping = None if job.statement else replace(self._mapping, resume=has_checkpoint(job.results))

@@ -19,12 +19,19 @@ class SurfaceOptions(Checked):
     """Hold the options of the surface that is read from a file.
 
     Attributes:
-        component: number of the connected component to use, counted from 0.
-        max_faces: refuse surfaces with more faces.
+        component: connected component to use, where there are several: its number, 0 has most faces, or "largest", the
+            one of the largest volume.
+        close: fill holes by smooth patches, and say how much area they add; "all" also fills loops longer than a
+            quarter of the box's diagonal, and more than 5 % of the area.
+        deflection: of a solid model (STEP, IGES), the largest distance of the triangles from its curved faces, in the
+            file's unit; a thousandth of the box's diagonal by default.
+        max_faces: refuse surfaces with more faces; where it is not given, reduce them to 500 000, as decimate does.
         decimate: reduce surfaces with more faces to max_faces instead; a notice has the distance from the original.
     """
 
-    component: int | None = None
+    component: int | Literal["largest"] | None = None
+    close: bool | Literal["all"] = False
+    deflection: float | None = None
     max_faces: int = 500_000
     decimate: bool = False
 

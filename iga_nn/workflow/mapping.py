@@ -123,7 +123,7 @@ def _prepare(
     """
     surface = given.surface
     log.info("%s: %d vertices, %d faces", surface.name, len(surface.vertices), len(surface.faces))
-    for notice in surface.notices:
+    for notice in _notices(surface):
         log.warning("%s: %s", surface.name, notice)
     if problem is not None:
         _check_data(problem, surface)
@@ -135,11 +135,16 @@ def _prepare(
     if mapping.resume and not is_resumed:
         log.info("no checkpoint, starting anew")
     with state.timed("load"):
-        expected = forecast(surface, mapping.config(), device=given.identity["device"], unknowns=unknowns)
+        expected = forecast(surface.fitted[0], mapping.config(), device=given.identity["device"], unknowns=unknowns)
     log.info("estimate: %s", expected)
     needed = f"{rounded(expected.memory_mb / 1000.0, 1)} GB of memory are needed"
     warn_of_memory(expected.memory_mb, needed, "lower --control-points or --refine, or free some")
     return expected
+
+
+def _notices(surface: Surface) -> list[str]:
+    """Return the notices of a surface, and that on the copy it is fitted on."""
+    return [*surface.notices, *filter(None, [surface.fitted[1]])]
 
 
 def _check_checkpoint(folder: Path, given: MapInput) -> None:
@@ -259,7 +264,7 @@ def _write(
     result.boundary.save(state.folder / "boundary.npz")
     save_arrays(state.folder / "history.npz", **result.history)
     state.write(
-        input=given.surface.summary(),
+        input=given.surface.summary() | {"notices": _notices(given.surface)},
         config=asdict(result.config),
         estimate=asdict(expected),
         seed=mapping.seed,

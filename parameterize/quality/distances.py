@@ -62,16 +62,16 @@ def nearest_on_boundary(
         own = np.flatnonzero(patches == number)
         if not own.size:
             continue
-        where[own], distances[own] = _closer(patch, points[own], where[own], axis[own])
+        where[own], distances[own] = closest_in_faces(points[own], patch, where[own], axis[own])
     return patches, where, distances
 
 
-def _closer(volume: BSplineVolume, points: Array, where: Array, axis: IntArray) -> tuple[Array, Array]:
-    """Return parameters (m, 3) nearer to points (m, 3), and their distances (m,), after Gauss-Newton steps in faces.
+def closest_in_faces(points: Array, volume: BSplineVolume, start: Array, axis: IntArray) -> tuple[Array, Array]:
+    """Return parameters (m, 3) near `start` whose values are closer to points (m, 3), and the distances (m,).
 
-    where: the parameters (m, 3) from which the steps begin; axis: (m,) the one that is constant on the face.
+    axis: (m,), the direction that is constant on the cube face of each start. Parameters stay on that face.
     """
-    active = np.arange(len(points))
+    where, active = start.copy(), np.arange(len(points))
     best: Array = np.linalg.norm(volume(where) - points, axis=1)
     for _ in range(_NEWTON_STEPS):
         trial, (a, b), rows = where[active], tangent_axes(axis[active]), np.arange(len(active))

@@ -1,4 +1,8 @@
-"""Reduces the number of triangles of a surface, only where the user asks for it."""
+"""Reduces the number of triangles of a surface, where the user asks for it, or of the copy a map is fitted on.
+
+A map costs by the vertices it is fitted to, while a spline of some 30 x 30 control points a face cannot follow more
+than some ten thousand of them. So surfaces of more than `MOST_FITTED` faces are laid out and fitted on a copy.
+"""
 
 from dataclasses import replace
 
@@ -7,33 +11,76 @@ import numpy as np
 
 from .errors import MeshError, check_face_limit
 from .geometry import doubled_areas
-from .groups import renumbered
+from .groups import Groups, renumbered
 from .surface import Surface, surface_from_arrays
+
+MOST_FITTED = 40_000  # faces: a surface of more is fitted on a copy; below, the copy would hardly be faster
+FITTED = 30_000  # faces of the copy
 
 
 def decimate(surface: Surface, max_faces: int) -> Surface:
     """Return the surface with at most `max_faces` triangles, or itself where it has no more.
 
-    Edges are collapsed by quadric errors (Garland, Heckbert, SIGGRAPH 1997), unless the collapse would make
-    triangles intersect. A notice has the counts and the largest distance moved; `sha256` is that of the new arrays.
-    Raises MeshError for a limit below 4, and where the surface cannot be brought below it.
+    Edges are collapsed by quadric errors (Garland, Heckbert, SIGGRAPH 1997), and where that makes triangles intersect,
+    once more without the collapses that do. A notice has the counts and the largest distance moved; `sha256` is that of
+    the new arrays. Raises MeshError for a limit below 4, and where the surface cannot be brought below it.
     """
     check_face_limit(max_faces)
     before = len(surface.faces)
     if before <= max_faces:
         return surface
-    name = surface.source or surface.name
+    smaller, moved = _reduced(surface, max_faces)
+    notice = f"decimated from {before} to {len(smaller.faces)} faces: moved by at most {moved:.3g}"
+    # Earlier notices concern the given surface, later ones the decimated surface.
+    return replace(smaller, notices=(*surface.notices, notice, *smaller.notices))
+
+
+def fitted_copy(surface: Surface) -> tuple[Surface, str]:
+    """Return the surface that maps are laid out and fitted on, and a notice; itself, and "", where it is small."""
+    before = len(surface.faces)
+    if before <= MOST_FITTED:
+        return surface, ""
+    try:
+        copy, moved = _reduced(surface, FITTED)
+    except MeshError as error:  # such as a surface that meets itself, whose copy tears
+        return surface, f"laid out and fitted with all its {before} faces, which takes long: {error}"
+    return copy, (
+        f"laid out and fitted on a copy of {len(copy.faces)} faces, at most {moved:.3g} away; measured on all {before}"
+    )
+
+
+def _reduced(surface: Surface, max_faces: int) -> tuple[Surface, float]:
+    """Return the surface with at most `max_faces` triangles, its notices those of the new arrays, and how far it moved.
+
+    Raises MeshError where there is none.
+    """
+    if len(surface.crossings) == 0:
+        try:
+            found, moved = _collapsed(surface, max_faces, block=False)  # in a third of the time
+            if len(found.crossings) == 0:
+                return found, moved
+        except MeshError:
+            pass  # triangles that meet may end up as one
+    return _collapsed(surface, max_faces, block=True)
+
+
+def _collapsed(surface: Surface, max_faces: int, *, block: bool) -> tuple[Surface, float]:
+    """Return the surface after collapses of its edges, and how far it moved.
+
+    block: whether collapses that make triangles meet are left out.
+    """
     unit = np.asfortranarray(surface.unit_vertices)
-    vertices, faces, *_ = igl.qslim(unit, surface.faces, max_faces, block_intersections=True)
+    vertices, faces, *_ = igl.qslim(unit, surface.faces, max_faces, block_intersections=block)
     if len(faces) > max_faces:
+        name = surface.source or surface.name
         raise MeshError(f"{name}: cannot be decimated below {len(faces)} faces: raise --max-faces")
     moved = igl.hausdorff(unit, surface.faces, vertices, faces) / surface.scale
-    notice = f"decimated from {before} to {len(faces)} faces: moved by at most {moved:.3g}"
     smaller = surface_from_arrays(surface.from_unit(vertices), faces, surface.name, max_faces=max_faces)
-    old = surface.part.nearest(
-        smaller.vertices[smaller.faces].mean(axis=1), doubled_areas(smaller.vertices, smaller.faces)
-    )
-    groups = renumbered(surface.groups, old)
-    # Earlier notices concern the given surface, later ones the decimated surface.
-    notices = (*surface.notices, notice, *smaller.notices)
-    return replace(smaller, source=surface.source, notices=notices, groups=groups)
+    groups = _groups(surface, smaller) if surface.groups else {}
+    return replace(smaller, source=surface.source, unit=surface.unit, groups=groups), float(moved)
+
+
+def _groups(surface: Surface, smaller: Surface) -> Groups:
+    """Return the groups of the smaller surface: each of its faces has those of the nearest face."""
+    middles = smaller.vertices[smaller.faces].mean(axis=1)
+    return renumbered(surface.groups, surface.part.nearest(middles, doubled_areas(smaller.vertices, smaller.faces)))

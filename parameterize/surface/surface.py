@@ -11,23 +11,23 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..arrays import Array, IntArray, in_brackets
+from ..arrays import Array, IntArray
 from ..display import Brief, Shown
 from . import topology
+from .bodies import Choice, outer_bodies
 from .errors import (
-    LARGEST,
     MeshError,
-    check_face_count,
     check_finite,
     check_indices,
     without_unused_defects,
 )
 from .geometry import deepest_point, signed_volume
 from .groups import Groups, checked, renumbered
+from .holes import Close
+from .mending import Asked, mend, without_defects
 from .part import PartSurface
 from .readers.file import RawMesh, read_mesh
 from .readers.objects import READERS, class_of, read_object
-from .welding import weld_and_drop, wind_outward
 
 if TYPE_CHECKING:
     import meshio
@@ -37,7 +37,6 @@ if TYPE_CHECKING:
 __all__ = ["MAX_FACES", "MeshError", "Surface", "load_surface", "surface_from_arrays"]
 
 MAX_FACES = 500_000
-USUAL_SIZES = (1e-6, 1e6)
 logger = logging.getLogger(__name__)
 
 
@@ -72,6 +71,8 @@ class Surface(Brief, Shown):
     groups : dict of str to array of int
         The faces of each group of the input, ascending: OBJ groups, materials and objects, STL solids, physical groups
         of Gmsh, whole numbers given with faces. A face may be in several.
+    unit : str
+        Of lengths, where the file has one, such as mm.
 
     Examples
     --------
@@ -94,6 +95,7 @@ class Surface(Brief, Shown):
     unit_vertices: Array
     crossings: IntArray
     groups: Groups
+    unit: str = ""
 
     def to_unit(self, points: ArrayLike) -> Array:
         """Return points (..., 3) in the user's units as placed points."""
@@ -123,6 +125,13 @@ class Surface(Brief, Shown):
         """Return the mesh whose triangles are found by group, by a nearby point, or up to sharp edges."""
         return PartSurface(self.vertices, self.faces, self.groups)
 
+    @cached_property
+    def fitted(self) -> "tuple[Surface, str]":
+        """Return the surface that maps are laid out and fitted on, and a notice; itself, and "", unless it is large."""
+        from .decimation import fitted_copy
+
+        return fitted_copy(self)
+
     def summary(self) -> dict[str, Any]:
         """Return the section `input` of report.json."""
         first = self.crossings[: topology.SHOWN]
@@ -135,6 +144,7 @@ class Surface(Brief, Shown):
             "volume": self.volume,
             "genus": self.genus,
             "bbox": [corner.tolist() for corner in self.bbox],
+            **({"unit": self.unit} if self.unit else {}),
             "self_intersections": {
                 "pairs": len(self.crossings),
                 "first": [
@@ -159,7 +169,9 @@ class Surface(Brief, Shown):
 def load_surface(
     mesh: "str | Path | trimesh.Trimesh | pyvista.PolyData | meshio.Mesh",
     *,
-    component: int | None = None,
+    component: Choice = None,
+    close: Close = False,
+    deflection: float | None = None,
     max_faces: int = MAX_FACES,
 ) -> Surface:
     """Return the surface of a file or of a mesh of trimesh, pyvista or meshio, checked and repaired.
@@ -167,10 +179,17 @@ def load_surface(
     Parameters
     ----------
     mesh : str or Path, or a trimesh.Trimesh, pyvista.PolyData or meshio.Mesh
-        The path of a surface (.obj, .stl, .ply, .off) or of cells (.mesh, .msh, .vtu), each also as .gz, or a mesh in
-        memory. Of solid cells the boundary is taken.
-    component : int, optional
-        The component to take where there are several; 0 is the largest.
+        The path of a surface (.obj, .stl, .ply, .off, .glb, .gltf, .3mf, .vtp), of cells (.mesh, .msh, .vtu, .vtk) or
+        of a solid model (.step, .iges, with the extra `cad`), each also as .gz or .zip, or a mesh in memory. Of solid
+        cells the boundary is taken.
+    component : int or "largest", optional
+        The component to take where there are several: 0 has most faces, "largest" encloses most volume.
+    close : bool or "all"
+        Fill holes by smooth patches; "all" also those longer than a quarter of the box's diagonal, or of more than 5 %
+        of the area.
+    deflection : float, optional
+        Of a solid model: largest distance of the triangles from curved faces, in the file's unit; a thousandth of the
+        box's diagonal by default.
     max_faces : int
         A surface with more faces is refused.
 
@@ -203,17 +222,26 @@ def load_surface(
         known = ", ".join(READERS)
         raise TypeError(f"mesh must be a path or one of {known}, got {mesh!r:.80}; for arrays: surface_from_arrays")
     source = kind or str(mesh)
+    asked = Asked(component, close, max_faces)
     try:
         if kind is not None:
-            surface = _gate(read_object(mesh, kind, max_faces), "surface", "", component, max_faces)
+            surface = _gate(read_object(mesh, kind, max_faces), "surface", "", asked)
         else:
             path = Path(source)
             name = path.name.split(".")[0] or path.name
-            surface = _gate(read_mesh(path, max_faces), name, source, component, max_faces)
+            surface = _gate(read_mesh(path, max_faces, deflection), name, source, asked)
     except MeshError as error:
         raise MeshError(f"{source}: {error}") from None
     logger.debug("%s: %d vertices, %d faces", source, len(surface.vertices), len(surface.faces))
     return surface
+
+
+def bodies_in(path: Path, max_faces: int = MAX_FACES) -> list[int | None]:
+    """Return the numbers of the components of a file that are bodies of their own, as `component` of `load_surface`.
+
+    One inside another is none. None alone stands for the only component. Raises MeshError for a file that is refused.
+    """
+    return outer_bodies(without_defects(read_mesh(path, max_faces), max_faces)[0])
 
 
 def surface_from_arrays(
@@ -221,7 +249,8 @@ def surface_from_arrays(
     faces: ArrayLike,
     name: str = "surface",
     *,
-    component: int | None = None,
+    component: Choice = None,
+    close: Close = False,
     max_faces: int = MAX_FACES,
     groups: Mapping[str, ArrayLike] | None = None,
 ) -> Surface:
@@ -235,8 +264,11 @@ def surface_from_arrays(
         Vertex numbers of the triangles, counted from 0.
     name : str
         The surface's name in messages and files.
-    component : int, optional
-        The component to take where there are several; 0 is the largest.
+    component : int or "largest", optional
+        The component to take where there are several: 0 has most faces, "largest" encloses most volume.
+    close : bool or "all"
+        Fill holes by smooth patches; "all" also those longer than a quarter of the box's diagonal, or of more than 5 %
+        of the area.
     max_faces : int
         A surface with more faces is refused.
     groups : dict of str to array of int, optional
@@ -270,7 +302,8 @@ def surface_from_arrays(
         check_finite(points, triangles)
         points, notices = without_unused_defects(points, triangles)
         named = checked(groups or {}, len(triangles))
-        return _gate(RawMesh(points, triangles, digest, notices, named), name, "", component, max_faces)
+        raw = RawMesh(points, triangles, digest, notices, named)
+        return _gate(raw, name, "", Asked(component, close, max_faces))
     except MeshError as error:
         raise MeshError(f"{name}: {error}") from None
 
@@ -283,59 +316,28 @@ def _array(values: ArrayLike, name: str) -> NDArray[Any]:
         raise MeshError(f"{name} must be rows of three, got rows of several lengths") from None
 
 
-def _gate(raw: RawMesh, name: str, source: str, component: int | None, max_faces: int) -> Surface:
-    """Make a surface: check, normalise, weld, choose the component, check the topology, orient, place."""
-    vertices, faces = raw.vertices, raw.faces
-    check_face_count(len(faces), max_faces)
-    if len(faces) < 4:
-        raise MeshError(f"{len(faces)} faces, a closed surface needs at least 4: export the whole surface")
-    middle, size, remarks = _box(vertices, faces)
-    unit = (vertices - middle) / size
-    triangles, left, mended = weld_and_drop(unit, faces)
-    if len(triangles) < 4:
-        raise MeshError(f"{len(triangles)} faces that are not degenerate, at least 4 are needed: export it again")
-    own, chosen = topology.choose_component(unit, triangles, component)
-    kept, compact = np.unique(triangles[own], return_inverse=True)
-    points, triangles = unit[kept], compact.reshape(-1, 3).astype(np.int64)
-
-    def where(vertex: int) -> str:
-        return in_brackets(vertices[kept[vertex]])
-
-    topology.check_manifold(triangles, where)
-    triangles, turned = wind_outward(points, triangles)
-    doubts = topology.slivers(points, triangles, where)
+def _gate(raw: RawMesh, name: str, source: str, asked: Asked) -> Surface:
+    """Make a surface: mend it, check its topology, place it."""
+    draft, mended = mend(raw, asked)
+    points, triangles = draft.points, draft.faces
+    doubts = topology.slivers(points, triangles, draft.where)
     crossings = topology.crossing_faces(points, triangles)
     if len(crossings):
-        doubts.append(topology.describe_crossings(vertices[kept], triangles, crossings))
+        doubts.append(topology.describe_crossings(draft.vertices, triangles, crossings))
     deepest, _ = deepest_point(points, triangles)
     unit_scale = signed_volume(points, triangles) ** (-1.0 / 3.0)
     placed = unit_scale * (points - deepest) + 0.5
     return Surface(
         name=name,
-        vertices=vertices[kept],
+        vertices=draft.vertices,
         faces=triangles,
         source=source,
         sha256=raw.sha256,
-        notices=(*raw.notices, *remarks, *mended, *chosen, *turned, *doubts),
-        scale=unit_scale / size,
-        center=deepest * size + middle,
+        notices=(*mended, *doubts),
+        scale=unit_scale / draft.size,
+        center=deepest * draft.size + draft.middle,
         unit_vertices=placed.astype(np.float32).astype(np.float64),
         crossings=crossings,
-        groups=renumbered(raw.groups, left[own]),
+        groups=renumbered(raw.groups, draft.old),
+        unit=raw.unit,
     )
-
-
-def _box(vertices: Array, faces: IntArray) -> tuple[Array, float, list[str]]:
-    """Return the middle (3,) and the longest side of the used vertices' box, and notices of its size and place."""
-    used = vertices[np.unique(faces)]
-    low, high = used.min(axis=0), used.max(axis=0)
-    size = float((high - low).max())
-    if size < 1.0 / LARGEST:
-        raise MeshError(f"longest side {size:g}: the surface is a single point or far too small; choose a smaller unit")
-    remarks = []
-    if not USUAL_SIZES[0] < size < USUAL_SIZES[1]:
-        remarks.append(f"unusual size, longest side {size:g}: computed at size 1 and scaled back")
-    middle = (low + high) / 2.0
-    if abs(middle).max() > 1e6 * size:
-        remarks.append(f"far from the origin ({abs(middle).max() / size:.1e} times its size): digits are lost")
-    return middle, size, remarks

@@ -19,14 +19,15 @@ SHAPE = 1e-10  # weight of the logarithm of a triangle's shape beside its area, 
 THINNEST = 1e-12  # shape (1: equilateral, 0: flat) below which all triangles weigh the same
 
 
-def triangulate(vertices: Array, polygons: list[list[int]]) -> IntArray:
+def triangulate(vertices: Array, polygons: list[list[int]], most: int = MAX_CORNERS) -> IntArray:
     """Return triangles (m, 3) in the polygons' order, wound like them; a polygon of n corners gives n - 2.
 
     Vertex numbers must be in range and coordinates finite; a triangle may repeat a corner only where its polygon does.
+    Raises MeshError for a polygon of more than `most` corners.
     """
     sizes = np.array([len(polygon) for polygon in polygons])
-    if sizes.max() > MAX_CORNERS:
-        raise MeshError(f"a face has {sizes.max()} corners, more than {MAX_CORNERS}: triangulate it")
+    if sizes.max() > most:
+        raise MeshError(f"a face has {sizes.max()} corners, more than {most}: triangulate it")
     corners = np.fromiter(chain.from_iterable(polygons), dtype=np.int64, count=sizes.sum())
     if sizes.max() == 3:
         return corners.reshape(-1, 3)
@@ -41,7 +42,7 @@ def triangulate(vertices: Array, polygons: list[list[int]]) -> IntArray:
 def _cut_all(points: Array, sizes: IntArray) -> IntArray:
     """Return triangles (m, 3), as rows of `points`, of polygons that follow one another there, of sizes (p,)."""
     triangles = np.empty((len(points) - 2 * len(sizes), 3), dtype=np.int64)
-    chains = np.empty((MAX_CORNERS, 2), dtype=np.int64)  # still to be cut, each by the triangle on its closing edge
+    chains = np.empty((sizes.max(), 2), dtype=np.int64)  # still to be cut, each by the triangle on its closing edge
     start = end = 0
     for size in sizes:
         apex = _apices(points[start : start + size])

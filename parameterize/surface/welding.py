@@ -52,24 +52,29 @@ def weld_and_drop(vertices: Array, faces: IntArray) -> tuple[IntArray, IntArray,
     return welded, kept, notices
 
 
+def wind_alike(faces: IntArray) -> tuple[IntArray, list[str]]:
+    """Return the faces (m, 3) of a component, open or closed, wound alike, and a notice. Raises MeshError."""
+    if is_oriented(faces):
+        return faces, []
+    wound, _ = igl.bfs_orient(faces)
+    if not is_oriented(wound):
+        raise MeshError("one-sided surface (no consistent orientation): it bounds no solid")
+    count = int(np.count_nonzero(np.any(wound != faces, axis=1)))
+    return wound, [f"repaired inconsistent winding: {min(count, len(faces) - count)} faces flipped"]
+
+
 def wind_outward(vertices: Array, faces: IntArray) -> tuple[IntArray, list[str]]:
-    """Return the faces (m, 3) of a closed component, wound outward, and notices; its box has side 1."""
-    wound, notices = faces, []
-    if not _is_oriented(faces):
-        wound, _ = igl.bfs_orient(faces)
-        if not _is_oriented(wound):
-            raise MeshError("one-sided surface (no consistent orientation): it bounds no solid")
-        count = int(np.count_nonzero(np.any(wound != faces, axis=1)))
-        notices.append(f"repaired inconsistent winding: {min(count, len(faces) - count)} faces flipped")
-    volume = signed_volume(vertices, wound)
+    """Return the faces (m, 3) of a closed component, wound alike, wound outward, and a notice; its box has side 1."""
+    volume = signed_volume(vertices, faces)
     if abs(volume) < LEAST_VOLUME:
         raise MeshError("encloses no volume (a flat or doubled sheet): give it thickness")
     if volume < 0:
-        return wound[:, ::-1].copy(), [*notices, "inverted orientation flipped: faces now point outward"]
-    return wound, notices
+        return faces[:, ::-1].copy(), ["inverted orientation flipped: faces now point outward"]
+    return faces, []
 
 
-def _is_oriented(faces: IntArray) -> bool:
+def is_oriented(faces: IntArray) -> bool:
+    """Return whether no two faces run along an edge in the same direction."""
     edges = directed_edges(faces)
     keys = edges[:, 0] * (int(faces.max()) + 1) + edges[:, 1]
     return len(np.unique(keys)) == len(keys)

@@ -50,6 +50,14 @@ def _scan(holes):
     return obj(vertices, np.delete(faces, np.arange(holes) * 97, axis=0))
 
 
+def _room(places):
+    """Cubes at these places, welded where they touch."""
+    parts = [(CUBE + place, TRIANGLES) for place in places]
+    vertices, faces = joined(*parts)
+    corners, numbers = np.unique(vertices, axis=0, return_inverse=True)
+    return obj(corners, numbers.ravel()[faces])
+
+
 def _archive():
     """A surface zipped, under a name that would lead out of a folder."""
     stream = io.BytesIO()
@@ -95,7 +103,22 @@ def shapes():
     yield "shells.obj", refused(obj(*joined(ball(2.0), _turned_inside(*ball()))), "nested shells")
     yield "flat.obj", refused(obj(CUBE * [1, 1, 0], TRIANGLES), "")
     yield "sheet.obj", refused(obj(CUBE[:4], [[0, 2, 3], [0, 3, 1], [0, 3, 2], [0, 1, 3]]), "")
-    yield "scan.obj", refused(_scan(3), "open surface: 3 boundary loops")
+    yield "scan.obj", refused(_scan(3), "open surface: 3 boundary loops (9 edges)")
+    yield "closed_scan.obj", accepted(_scan(3), "closed 3 boundary loops", "--close")
+    yield "lid.obj", refused(obj(faces=QUADS[1:]), "close the hole with --close all")
+    yield "wide.obj", refused(obj(faces=QUADS[1:]), "the longest 231 % of the box's diagonal", "--close")
+    yield "closed_lid.obj", accepted(obj(faces=QUADS[1:]), "area 1, 17 % of the surface", "--close", "all")
+    yield "rooms.obj", accepted(_room([(0, 0, 0), (0, 0, 1)]), "walls of no thickness, area 1")
+    yield "edge.obj", refused(_room([(0, 0, 0), (0, 1, 1)]), "2 components")
+    yield "corner.obj", accepted(_room([(0, 0, 0), (1, 1, 1)]), "split 1 vertex", "--component", "largest")
+    yield (
+        "specks.obj",
+        accepted(obj(*joined(ball(), ball(0.1, (3, 0, 0), 3))), "enclose 0.00", "--component", "largest"),
+    )
+    yield (
+        "cavity.obj",
+        accepted(obj(*joined(ball(2.0), _turned_inside(*ball()))), "12.50% of its volume", "--component", "largest"),
+    )
     yield "angle.obj", accepted(_angle(), "8 polygons cut into 20 triangles")
     yield "pocket.obj", accepted(_pocket(), "11 polygons cut into 28 triangles")
     yield "spike.obj", accepted(_spike(), "self-intersection")
@@ -107,11 +130,11 @@ def shapes():
 
 def files():
     """What is no defect of a surface: archives, limits, choices."""
-    yield "cube.zip", refused(_archive(), "unpack what is in it first")
+    yield "cube.zip", accepted(_archive(), "unpacked '../../cube.obj' from .zip")
     yield "zipped.obj", refused(_archive(), "unpack what is in it first")
     yield "zipped.npz", refused(_archive(), "has no array named")
-    yield "scene.gltf", refused('{"asset": {"version": "2.0"}}', "unknown format: expected")
-    yield "model.3mf", refused(_archive(), "unknown format: expected")
+    yield "scene.gltf", refused('{"asset": {"version": "2.0"}}', "has no triangles")
+    yield "archive.3mf", refused(_archive(), "the archive has no 3D model")
     yield "limit.obj", accepted(obj(faces=TRIANGLES), "", "--max-faces", "12")
     yield "over.obj", refused(obj(faces=TRIANGLES), "12 faces, more than max_faces=11", "--max-faces", "11")
     yield "over.stl", refused(binary_stl(), "12 faces, more than max_faces=11", "--max-faces", "11")

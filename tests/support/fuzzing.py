@@ -36,6 +36,7 @@ from pathlib import Path
 import formulas
 import meshio
 import numpy as np
+import pyvista
 from bodies import exact_ring
 from foreign_files import geopdes, geopdes_07, mfem_patches
 from mesh_files import (
@@ -54,6 +55,8 @@ from mesh_files import (
     text_stl,
 )
 from reader_files import Ply, beside, faces, grid, msh2, msh2_binary, msh41, msh41_binary, save, vertices
+from scene_files import glb, gltf, model, solid_model, threemf, zipped
+from vtkmodules.vtkIOLegacy import vtkUnstructuredGridWriter
 
 from iga_nn.errors import InputError, input_errors, one_line
 from iga_nn.io import gismo, mfem_writer
@@ -90,7 +93,8 @@ class Reader:
     """One kind of file.
 
     read: called with a path, as the command line does it. seeds: good files, each in the pieces that `pack` makes a
-    file of: spoiling a piece gets past the checksum of the whole. packed: also as .gz.
+    file of: spoiling a piece gets past the checksum of the whole. packed: also as .gz. share: of the files that another
+    reader gets, for one that takes seconds a file.
     """
 
     name: str
@@ -99,6 +103,7 @@ class Reader:
     seeds: tuple[Pieces, ...]
     pack: Callable[[Pieces], bytes] = b"".join
     packed: bool = False
+    share: float = 1.0
 
 
 # Spoiling: each takes the random numbers and some bytes, and gives other bytes.
@@ -377,6 +382,48 @@ def vtk_files():
             yield written(partial(save, mesh, mode=mode, compressor=packing, order=order, header=header), ".vtu")
 
 
+def vtk_polygons(suffix):
+    """Polygons, strips and lines by VTK's own writers."""
+    mesh = pyvista.PolyData.from_regular_faces(CUBE, np.array(QUADS))
+    mesh.cell_data["part"] = np.arange(len(QUADS)) // 2
+    for binary in (False, True):
+        yield written(partial(mesh.save, binary=binary), suffix)
+    strips = [[1, 0, 3, 2], [4, 5, 6, 7], [0, 1, 4, 5], [3, 2, 7, 6], [0, 4, 2, 6], [1, 3, 5, 7]]
+    strip = pyvista.PolyData(CUBE, strips=np.ravel([[4, *row] for row in strips]), lines=[2, 0, 1])
+    yield written(partial(strip.save, binary=True), suffix)
+
+
+def legacy_vtks():
+    """Polygons of version 5.1; cells of version 4.2, whose lists begin with their lengths."""
+    yield from vtk_polygons(".vtk")
+    mesh = grid([(12, [0, 1, 3, 2, 4, 5, 7, 6]), *((9, quad) for quad in QUADS), (3, [0, 1])])
+    mesh.cell_data["part"] = np.arange(mesh.n_cells)
+    for kind in (1, 2):
+
+        def write(path, kind=kind):
+            writer = vtkUnstructuredGridWriter()
+            writer.SetInputData(mesh)
+            writer.SetFileVersion(42)
+            writer.SetFileType(kind)
+            writer.SetFileName(str(path))
+            writer.Write()
+
+        yield written(write, ".vtk")
+
+
+def scene_readers():
+    """The pieces are what an archive or a .glb holds, so that spoiled ones get past its checksums."""
+    nodes = [{"children": [1], "rotation": [0.5, 0.5, 0.5, 0.5]}, {"mesh": 0, "name": "a", "scale": [2, 1, 1]}]
+    yield Reader("glb", ".glb", check, (list(gltf()), list(gltf(nodes=nodes))), glb, packed=True)
+    yield surface_reader("gltf", ".gltf", gltf(inside=False)[0])
+    yield Reader("3mf", ".3mf", check, ([model()],), lambda pieces: threemf(pieces[0]))
+    yield Reader("zip", ".zip", check, ([obj().encode()],), lambda pieces: zipped({"a/cube.obj": pieces[0]}))
+    yield Reader("zip, bytes", ".zip", check, ([zipped({"cube.stl": binary_stl(), "b.txt": "b"})],))
+    for suffix in (".step", ".iges"):
+        if found := solid_model(suffix[1:]):
+            yield Reader(suffix[1:], suffix, check, ([found],), share=0.1)
+
+
 def npz_reader(name, read, *things):
     """The arrays are the pieces: spoiled, they are packed again with the right checksums."""
     archives = [zipfile.ZipFile(io.BytesIO(written(thing.save, ".npz"))) for thing in things]
@@ -457,6 +504,9 @@ def readers() -> tuple[Reader, ...]:
         surface_reader("msh, any", ".msh", *any_mshs()),
         surface_reader("vtu of VTK", ".vtu", *vtk_files()),
         meshio_reader("vtu", ".vtu", {"binary": False}, {"compression": None}, {"compression": "zlib"}),
+        surface_reader("vtp", ".vtp", *vtk_polygons(".vtp")),
+        surface_reader("vtk", ".vtk", *legacy_vtks()),
+        *scene_readers(),
         npz_reader("volume.npz", check, *volumes),
         npz_reader("volume.npz of patches", read_volume, glued(3, 2)),
         npz_reader("volume.npz, rational", read_volume, exact_ring()),
@@ -611,7 +661,7 @@ def main() -> int:
         started = time.perf_counter()
         check_seeds(reader)
         count = (k + 1) * options.files // len(chosen) - k * options.files // len(chosen)
-        tally = survey(reader, options.seed, count, options.failed)
+        tally = survey(reader, options.seed, round(reader.share * count), options.failed)
         seconds = time.perf_counter() - started
         counts = (f"{tally.outcomes[outcome]:9d}" for outcome in OUTCOMES)
         print(f"{reader.name:14s}", *counts, f"{tally.peak / 1e6:8.0f} {seconds:8.0f}", flush=True)

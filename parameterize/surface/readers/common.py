@@ -28,13 +28,15 @@ class Content:
     """The content of a surface file.
 
     vertices: (n, 3). polygons: the vertex numbers of each face, counted from 0; they may be out of range.
-    notices: one line each on data that were left out or changed. groups: numbers of polygons by name.
+    notices: one line each on data that were left out or changed. groups: numbers of polygons by name. unit: of lengths,
+    "" where the format has none.
     """
 
     vertices: Array
     polygons: list[list[int]]
     notices: tuple[str, ...] = ()
     groups: Groups = field(default_factory=dict)
+    unit: str = ""
 
 
 def most_bytes(max_faces: int) -> int:

@@ -15,14 +15,19 @@ from ...arrays import Array, IntArray
 from ..errors import MeshError, check_face_count, check_finite, check_indices, without_unused_defects
 from ..groups import Groups, few, renumbered
 from ..triangulation import triangulate
+from .archive import Archive
+from .cad import read_iges, read_step
 from .common import DAMAGED, Content, most_bytes
+from .gltf import read_glb, read_gltf
 from .gmsh import read_gmsh
 from .medit import read_medit
 from .obj import read_obj
 from .off import read_off
 from .ply import read_ply
 from .stl import read_stl
-from .vtu import read_vtu
+from .threemf import read_3mf
+from .vtk_legacy import read_vtk
+from .vtu import read_vtp, read_vtu
 
 # Each takes the bytes of a file, and how many faces it may have; MeshError, without the file's name, for a bad one.
 READERS: dict[str, Callable[[bytes, int], Content]] = {
@@ -33,40 +38,79 @@ READERS: dict[str, Callable[[bytes, int], Content]] = {
     ".mesh": read_medit,
     ".msh": read_gmsh,
     ".vtu": read_vtu,
+    ".vtp": read_vtp,
+    ".vtk": read_vtk,
+    ".glb": read_glb,
+    ".gltf": read_gltf,
+    ".3mf": read_3mf,
 }
-FORMATS = tuple(READERS)
+# The same, with the deflection of curved faces beside it.
+SOLID_MODELS: dict[str, Callable[[bytes, int, float | None], Content]] = {
+    ".step": read_step,
+    ".stp": read_step,
+    ".iges": read_iges,
+    ".igs": read_iges,
+}
+FORMATS = (*READERS, *SOLID_MODELS)
+PACKED = (".gz", ".zip")
 
 
 @dataclass(frozen=True, eq=False)
 class RawMesh:
-    """Triangles before any repair: vertices (n, 3), faces (m, 3) with valid indices, groups; sha256 of the source."""
+    """Triangles before any repair: vertices (n, 3), faces (m, 3) with valid indices, groups; sha256 of the source.
+
+    unit: of lengths, "" where it is not known.
+    """
 
     vertices: Array
     faces: IntArray
     sha256: str
     notices: tuple[str, ...]
     groups: Groups
+    unit: str = ""
 
 
-def read_mesh(path: Path, max_faces: int) -> RawMesh:
-    """Read .obj, .stl, .ply, .off (surfaces) and .mesh, .msh, .vtu (solids: their boundary), each also as .gz."""
+def read_mesh(path: Path, max_faces: int, deflection: float | None = None) -> RawMesh:
+    """Read a file of `FORMATS`, also as .gz or as the only surface of a .zip.
+
+    deflection: largest distance of the triangles from the curved faces of a solid model, in the file's unit.
+    """
     if path.is_dir():
         raise MeshError("is a directory: name the surface file in it")
     if path.exists() and not path.is_file():
         raise MeshError("is no regular file: save the surface as one")
-    suffixes = [suffix.lower() for suffix in path.suffixes]
-    packed = suffixes[-1:] == [".gz"]
-    suffix = "".join((suffixes[:-1] if packed else suffixes)[-1:])
-    if suffix not in READERS:
-        raise MeshError(f"unknown format: expected a name ending in one of {' '.join(FORMATS)}, or these with .gz")
-    stored = _read_bytes(path, most_bytes(max_faces))
-    data = _unpack(stored, most_bytes(max_faces)) if packed else stored
+    suffix, packed = _endings(path.name)
+    if suffix not in FORMATS and packed != ".zip":
+        raise MeshError(
+            f"unknown format: expected a name ending in one of {' '.join(FORMATS)}, or these with .gz or .zip"
+        )
+    limit = most_bytes(max_faces)
+    stored = data = _read_bytes(path, limit)
+    unpacked: tuple[str, ...] = ()
+    if packed == ".gz":
+        data, unpacked = _unpack(stored, limit), ("unpacked from .gz",)
+    elif packed == ".zip":
+        archive = Archive(stored, limit)
+        member = archive.only(FORMATS)
+        data, suffix, unpacked = archive.read(member), _endings(member)[0], (f"unpacked {member!r:.80} from .zip",)
     if not data.strip():
         raise MeshError("the file is empty: export it again")
-    content = READERS[suffix](data, max_faces)
+    if deflection is not None and suffix not in SOLID_MODELS:
+        raise MeshError(f"deflection is for {' '.join(SOLID_MODELS)}, whose faces are curved: leave --deflection out")
+    content = (
+        SOLID_MODELS[suffix](data, max_faces, deflection)
+        if suffix in SOLID_MODELS
+        else READERS[suffix](data, max_faces)
+    )
     vertices, faces, notices, groups = triangles_of(content, max_faces)
-    unpacked = ("unpacked from .gz",) * packed
-    return RawMesh(vertices, faces, hashlib.sha256(stored).hexdigest(), unpacked + notices, groups)
+    return RawMesh(vertices, faces, hashlib.sha256(stored).hexdigest(), unpacked + notices, groups, content.unit)
+
+
+def _endings(name: str) -> tuple[str, str]:
+    """Return the ending of the format and that of the packing, "" where there is none."""
+    suffixes = [suffix.lower() for suffix in Path(name).suffixes]
+    packed = suffixes.pop() if suffixes[-1:] and suffixes[-1] in PACKED else ""
+    return "".join(suffixes[-1:]), packed
 
 
 def triangles_of(content: Content, max_faces: int) -> tuple[Array, IntArray, tuple[str, ...], Groups]:

@@ -1,7 +1,8 @@
-"""VTK's .vtu: points and cells of all its pieces, whole numbers of cells as groups; other data are skipped."""
+"""VTK's .vtu and .vtp: points and cells of all pieces, whole numbers of cells as groups; other data are skipped."""
 
 import re
 import warnings
+from collections.abc import Callable
 from typing import Any
 from xml.etree import ElementTree
 
@@ -18,23 +19,41 @@ from .vtk_arrays import TYPES, WORDS, Decoder
 KINDS = {0: "empty", 1: "vertex", 2: "poly_vertex", 3: "line", 4: "poly_line", 5: "triangle", 6: "triangle_strip"}
 KINDS |= {7: "polygon", 8: "pixel", 9: "quad", 10: "tetra", 11: "voxel", 12: "hexahedron", 13: "wedge", 14: "pyramid"}
 KINDS |= {15: "penta_prism", 16: "hexa_prism", 21: "line3", 35: "line4"}
+PARTS = {"Verts": "vertex", "Lines": "poly_line", "Strips": "triangle_strip", "Polys": "polygon"}  # in VTK's order
 Marks = dict[str, NDArray[Any]]  # by the name of an array, a number of each cell
 APPENDED = re.compile(rb"<AppendedData\b([^>]*)>\s*_?")
 
 
 def read_vtu(data: bytes, max_faces: int) -> Content:
     """Read a .vtu of any version of the format; where it has several pieces, points in the same place are joined."""
+    return _read(data, max_faces, ".vtu", "UnstructuredGrid", _piece)
+
+
+def read_vtp(data: bytes, max_faces: int) -> Content:
+    """Read a .vtp as `read_vtu` reads a .vtu."""
+    return _read(data, max_faces, ".vtp", "PolyData", _polygons)
+
+
+Piece = tuple[Array, list[tuple[str, Rows]], Marks]
+
+
+def _read(
+    data: bytes, max_faces: int, suffix: str, kind: str, read_piece: Callable[[ElementTree.Element, Decoder], Piece]
+) -> Content:
+    """Read a file of that kind of data set, piece by piece."""
     if b"<VTKFile" not in data[:4096] or b"</VTKFile>" not in data[-256:]:
-        raise MeshError(f"not a whole .vtu: no <VTKFile> ... </VTKFile>; {DAMAGED}")
+        raise MeshError(f"not a whole {suffix}: no <VTKFile> ... </VTKFile>; {DAMAGED}")
     if b"<!DOCTYPE" in data or b"<!ENTITY" in data:
-        raise MeshError("the .vtu declares a document type, whose entities are not expanded: remove the declaration")
-    root, decoder = _opened(data, most_bytes(max_faces))
-    steps = [grid.get("TimeValues", "").split() for grid in root.iter("UnstructuredGrid")]
+        raise MeshError(
+            f"the {suffix} declares a document type, whose entities are not expanded: remove the declaration"
+        )
+    root, decoder = _opened(data, most_bytes(max_faces), suffix, kind)
+    steps = [grid.get("TimeValues", "").split() for grid in root.iter(kind)]
     notices = tuple(f"the first of {len(times)} time steps read" for times in steps if len(times) > 1)
     points, cells, marks = [np.empty((0, 3))], [], []
     for piece in root.iter("Piece"):
         first = sum(map(len, points))
-        found, held, marked = _piece(piece, decoder)
+        found, held, marked = read_piece(piece, decoder)
         points.append(found)
         cells += [(kind, _shifted(rows, first)) for kind, rows in held]
         marks += [marked] * bool(held)
@@ -44,7 +63,7 @@ def read_vtu(data: bytes, max_faces: int) -> Content:
     return _joined(np.concatenate(points), cells, (*notices, f"{len(points) - 1} pieces joined"), groups)
 
 
-def _opened(data: bytes, limit: int) -> tuple[ElementTree.Element, Decoder]:
+def _opened(data: bytes, limit: int, suffix: str, kind: str) -> tuple[ElementTree.Element, Decoder]:
     """Return the tree of the file without its appended data, and the decoder of its arrays."""
     mark = APPENDED.search(data)
     text = data[: mark.start()] + b"</VTKFile>" if mark else data
@@ -52,8 +71,8 @@ def _opened(data: bytes, limit: int) -> tuple[ElementTree.Element, Decoder]:
         root = ElementTree.fromstring(text)  # noqa: S314 - it has no entities
     except (ElementTree.ParseError, ValueError, LookupError) as error:
         raise MeshError(f"not readable as XML ({error}); {DAMAGED}") from None
-    if root.get("type") != "UnstructuredGrid":
-        raise MeshError(f"the .vtu holds {root.get('type')!r:.40}, expected UnstructuredGrid: save it as one")
+    if root.get("type") != kind:
+        raise MeshError(f"the {suffix} holds {root.get('type')!r:.40}, expected {kind}: save it as one")
     word = WORDS.get(root.get("header_type", "UInt32"))
     if word is None:
         raise MeshError(f"the header_type is {root.get('header_type')!r:.40}, expected UInt32 or UInt64; {DAMAGED}")
@@ -64,15 +83,12 @@ def _opened(data: bytes, limit: int) -> tuple[ElementTree.Element, Decoder]:
     return root, decoder
 
 
-def _piece(piece: ElementTree.Element, decoder: Decoder) -> tuple[Array, list[tuple[str, Rows]], Marks]:
+def _piece(piece: ElementTree.Element, decoder: Decoder) -> Piece:
     """Return a piece's points (n, 3), its cells by kind and their numbers; empty arrays for a piece without cells."""
     n, m = (header_count(piece.get(name, "")) for name in ("NumberOfPoints", "NumberOfCells"))
     if not m:
         return np.empty((0, 3)), [], {}
-    points = _array(piece, "Points", None)
-    if points.get("NumberOfComponents", "3") != "3":
-        raise MeshError("points of the .vtu have not three coordinates each: export three")
-    places = decoder.numbers(points, 3 * n).astype(np.float64).reshape(n, 3)
+    places = _places(piece, decoder, n)
     types = decoder.numbers(_array(piece, "Cells", "types"), m).astype(np.int64)
     ends = decoder.numbers(_array(piece, "Cells", "offsets"), m).astype(np.int64)
     sizes = np.diff(ends, prepend=0)
@@ -81,7 +97,34 @@ def _piece(piece: ElementTree.Element, decoder: Decoder) -> tuple[Array, list[tu
     corners = decoder.numbers(_array(piece, "Cells", "connectivity"), int(ends[-1])).astype(np.int64)
     order = np.argsort(types, kind="stable")  # cells are returned kind by kind
     marks = {name: decoder.numbers(array, m)[order] for name, array in _marks(piece).items()}
-    return places, _by_kind(types, sizes, ends, corners), marks
+    return places, by_kind(types, sizes, ends, corners), marks
+
+
+def _polygons(piece: ElementTree.Element, decoder: Decoder) -> Piece:
+    """Return a piece's points (n, 3), its polygons, strips, vertices and lines, and their numbers."""
+    counts = [header_count(piece.get(f"NumberOf{name}", "0")) for name in PARTS]
+    n = header_count(piece.get("NumberOfPoints", ""))
+    if not sum(counts):
+        return np.empty((0, 3)), [], {}
+    cells: list[tuple[str, Rows]] = []
+    for (name, kind), count in zip(PARTS.items(), counts, strict=True):
+        if not count:
+            continue
+        ends = decoder.numbers(_array(piece, name, "offsets"), count).astype(np.int64)
+        if np.diff(ends, prepend=0).min() < 0:
+            raise MeshError(f"the offsets of the .vtp's {name} decrease; {DAMAGED}")
+        corners = decoder.numbers(_array(piece, name, "connectivity"), int(ends[-1])).astype(np.int64)
+        cells.append((kind, [row.tolist() for row in np.split(corners, ends[:-1])]))
+    marks = {name: decoder.numbers(array, sum(counts)) for name, array in _marks(piece).items()}
+    return _places(piece, decoder, n), cells, marks
+
+
+def _places(piece: ElementTree.Element, decoder: Decoder, count: int) -> Array:
+    """Return the points (n, 3) of a piece."""
+    points = _array(piece, "Points", None)
+    if points.get("NumberOfComponents", "3") != "3":
+        raise MeshError("the points have not three coordinates each: export three")
+    return decoder.numbers(points, 3 * count).astype(np.float64).reshape(count, 3)
 
 
 def _marks(piece: ElementTree.Element) -> dict[str, ElementTree.Element]:
@@ -102,10 +145,10 @@ def _array(piece: ElementTree.Element, part: str, name: str | None) -> ElementTr
     for array in piece.iterfind(f"{part}/DataArray"):
         if name is None or array.get("Name") == name:
             return array
-    raise MeshError(f"the .vtu lacks the array {name or 'of points'} in <{part}>; {DAMAGED}")
+    raise MeshError(f"the file lacks the array {name or 'of points'} in <{part}>; {DAMAGED}")
 
 
-def _by_kind(types: IntArray, sizes: IntArray, ends: IntArray, corners: IntArray) -> list[tuple[str, Rows]]:
+def by_kind(types: IntArray, sizes: IntArray, ends: IntArray, corners: IntArray) -> list[tuple[str, Rows]]:
     """Return cells by kind; raise MeshError naming a type that is not read."""
     cells: list[tuple[str, Rows]] = []
     for number in np.unique(types).tolist():

@@ -1,0 +1,50 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from mesh_files import ball, joined, obj
+
+from parameterize.surface.surface import bodies_in, surface_from_arrays
+
+
+def test_largest_is_the_one_of_most_volume():
+    fine, large = ball(0.5, subdivisions=3), ball(2.0, (5, 0, 0))
+    surface = surface_from_arrays(*joined(fine, large), component="largest")
+    assert surface.center == pytest.approx([5, 0, 0], abs=0.05)
+    (notice,) = surface.notices
+    small = surface_from_arrays(*fine).volume
+    told = f"component 1 taken of 2 (0: 1280 faces, 1: 320 faces); the ones left out enclose {small:.3g}, this one "
+    assert notice == f"{told}{surface.volume:.3g}"
+
+
+def test_what_is_inside_the_chosen_one_is_told_with_its_share():
+    outer, (vertices, faces) = ball(2.0), ball(1.0)
+    surface = surface_from_arrays(*joined(outer, (vertices, faces[:, ::-1])), component="largest")
+    assert surface.volume == pytest.approx(surface_from_arrays(*outer).volume)
+    assert "component 1, a cavity or another body, 12.50% of its volume" in surface.notices[0]
+
+
+def test_a_copy_is_no_second_body():
+    vertices, faces = ball()
+    shuffled = np.random.default_rng(0).permutation(len(vertices))
+    copy = vertices[np.argsort(shuffled)], shuffled[faces[::-1]][:, ::-1]
+    surface = surface_from_arrays(*joined((vertices, faces), copy))
+    assert len(surface.faces) == len(faces)
+    assert surface.notices == (
+        "dropped 1 component (320 faces) exactly on the faces of others: the volume is unchanged",
+    )
+
+
+def test_open_bodies_are_measured_too_and_only_the_chosen_one_is_closed():
+    (vertices, faces), (far, small) = ball(2.0, subdivisions=3), ball(1.0, (5, 0, 0), 4)
+    pair = joined((vertices, faces[1:]), (far, small[9:]))
+    surface = surface_from_arrays(*pair, component="largest", close=True)
+    assert len(surface.faces) == len(faces) and surface.center == pytest.approx([0, 0, 0], abs=0.1)
+
+
+def test_bodies_of_a_file(tmp_path):
+    path = tmp_path / "parts.obj"
+    path.write_text(obj(*joined(ball(2.0), ball(subdivisions=3), ball(0.5, (5, 0, 0), 1))))
+    assert bodies_in(path) == [1, 2]  # 0 is the ball inside
+    path.write_text(obj(*ball()))
+    assert bodies_in(path) == [None]

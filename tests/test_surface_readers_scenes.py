@@ -1,0 +1,108 @@
+"""glTF, 3MF and archives: places of nodes and components, units, groups."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import trimesh
+from mesh_files import CUBE, TRIANGLES, obj
+from scene_files import glb, gltf, model, threemf, zipped
+
+from parameterize.surface.surface import MeshError, load_surface
+
+
+def read(folder, name, content, **options):
+    path = folder / name
+    path.write_bytes(content)
+    return load_surface(path, **options)
+
+
+def test_a_scene_of_trimesh_has_its_bodies_in_their_places(tmp_path):
+    ball, box = trimesh.creation.icosphere(), trimesh.creation.box((1.0, 2.0, 3.0))
+    turn = trimesh.transformations.euler_matrix(0.3, 1.2, -0.7)
+    turn[:3, 3] = (4.0, -1.0, 2.0)
+    scene = trimesh.Scene()
+    scene.add_geometry(ball, node_name="ball")
+    scene.add_geometry(box, transform=turn, node_name="box")
+    content = scene.export(file_type="glb")
+    surface = read(tmp_path, "scene.glb", content, component=1)
+    assert surface.volume == pytest.approx(6.0, rel=1e-6) and surface.unit == "m"
+    expected = trimesh.transform_points(box.vertices, turn)
+    assert np.allclose(np.sort(surface.vertices, axis=0), np.sort(expected, axis=0), atol=1e-6)
+    assert list(surface.groups) == ["box"] and len(surface.groups["box"]) == 12
+    assert read(tmp_path, "scene.glb", content, component="largest").volume == pytest.approx(max(ball.volume, 6.0))
+
+
+def test_nodes_in_nodes_and_materials_are_groups(tmp_path):
+    nodes = [
+        {"children": [1], "name": "part", "matrix": [0, 1, 0, 0, 0, 0, 1, 0, 1, 0, 0, 0, 5, 6, 7, 1]},
+        {"mesh": 0, "name": "cube", "scale": [1, 2, 3], "rotation": [0.5, 0.5, 0.5, 0.5]},
+    ]
+    given = gltf(nodes=nodes, primitive={"material": 0}, materials=[{"name": "steel"}])
+    surface = read(tmp_path, "cube.glb", glb(given))
+    assert surface.volume == pytest.approx(6.0)
+    # (1, 2, 3) turned twice about the diagonal: x to y, y to z, z to x
+    assert np.allclose(surface.bbox, [[5, 6, 7], [7, 9, 8]])
+    assert list(surface.groups) == ["part", "cube", "steel"]
+
+
+@pytest.mark.parametrize(("mode", "rows"), [(5, [0, 1, 2, 3]), (6, [0, 1, 3, 2])])
+def test_strips_and_fans(mode, rows, tmp_path):
+    """The four corners of a square, as a strip or a fan; with all other faces a cube."""
+    others = [face for face in TRIANGLES.tolist() if not set(face) <= {0, 1, 2, 3}]
+    text, binary = gltf(faces=[])
+    first, second = np.array(rows, "<u2").tobytes(), np.array(others, "<u2").tobytes()
+    corners = [
+        {"componentType": 5123, "type": "SCALAR", "count": 4},
+        {"componentType": 5123, "type": "SCALAR", "count": 30},
+    ]
+    more = {
+        "meshes": [
+            {
+                "primitives": [
+                    {"attributes": {"POSITION": 0}, "indices": 1, "mode": mode},
+                    {"attributes": {"POSITION": 0}, "indices": 2},
+                ]
+            }
+        ],
+        "accessors": [
+            {"bufferView": 0, "componentType": 5126, "count": 8, "type": "VEC3"},
+            *({"bufferView": k + 1, **corner} for k, corner in enumerate(corners)),
+        ],
+        "bufferViews": [
+            {"buffer": 0, "byteLength": 96},
+            {"buffer": 0, "byteOffset": 96, "byteLength": 8},
+            {"buffer": 0, "byteOffset": 104, "byteLength": 60},
+        ],
+    }
+    assert read(tmp_path, "cube.glb", glb((gltf(**more)[0], binary + first + second))).volume == pytest.approx(1.0)
+
+
+def test_components_and_items_of_a_3mf_have_their_places_and_the_unit_is_kept(tmp_path):
+    surface = read(tmp_path, "cube.3mf", threemf())
+    assert surface.volume == pytest.approx(8.0) and surface.unit == surface.summary()["unit"] == "in"
+    assert np.allclose(surface.bbox, [[5, 0, 0], [7, 2, 2]]) and list(surface.groups) == ["block"]
+    turned = '<item objectid="2" transform="0 1 0 -1 0 0 0 0 1 0 0 10"/>'  # rows: x goes to y, y to -x
+    assert np.allclose(read(tmp_path, "cube.3mf", threemf(model(build=turned))).bbox, [[-2, 5, 10], [0, 7, 12]])
+
+
+def test_supports_are_left_out_and_other_parts_are_found(tmp_path):
+    more = '<object id="3" type="support"><components><component objectid="1"/></components></object>'
+    surface = read(tmp_path, "cube.3mf", threemf(model(build='<item objectid="1"/><item objectid="3"/>', more=more)))
+    assert surface.volume == pytest.approx(1.0) and surface.notices == ("left out 1 supports",)
+    production = 'xmlns:p="http://schemas.microsoft.com/3dmanufacturing/production/2015/06"'
+    start = model(build=f'<item objectid="1" {production} p:path="/3D/parts/block.model"/>', faces=[])
+    members = {"3D/3dmodel.model": start, "3D/parts/block.model": model(build="")}
+    assert read(tmp_path, "cube.3mf", zipped(members)).volume == pytest.approx(1.0)
+
+
+def test_an_archive_of_zeros_stops_at_the_limit(tmp_path):
+    with pytest.raises(MeshError, match="unpacks to more than the limit"):
+        read(tmp_path, "bomb.zip", zipped({"cube.obj": b"v 0 0 0\n" * (9 << 20)}), max_faces=4)
+
+
+def test_a_packed_surface_is_the_same_surface(tmp_path):
+    given = read(tmp_path, "cube.obj", obj(CUBE).encode())
+    packed = read(tmp_path, "cube.zip", zipped({"deep/folder/cube.obj": obj(CUBE)}))
+    assert np.array_equal(given.vertices, packed.vertices) and packed.name == "cube"
+    assert given.unit == packed.unit == ""
