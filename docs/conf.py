@@ -47,7 +47,8 @@ napoleon_use_rtype = False
 
 EXECUTED = (  # the others train for minutes: their pages show results that are kept
     "boundary_conditions", "bracket", "compare", "convection_diffusion", "elasticity", "heat", "large_strain",
-    "l_shape", "nonlinear_conductivity", "own_law", "plate_with_hole", "rational_ring", "thermal_stress", "vibration",
+    "l_shape", "nonlinear_conductivity", "own_law", "plate_with_hole", "pulled_ring", "rational_ring",
+    "thermal_stress", "vibration",
 )  # fmt: skip
 TOOLS = ("common", "gallery", "validation")  # no examples of their own
 sphinx_gallery_conf = {

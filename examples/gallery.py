@@ -48,6 +48,7 @@ def runs(full: bool) -> dict[str, Callable[[], Path]]:
         "rational_ring": lambda: module("rational_ring").main(),
         "l_shape": lambda: module("l_shape").main(),
         "plate_with_hole": lambda: module("plate_with_hole").main(),
+        "pulled_ring": lambda: module("pulled_ring").main(),
         "bracket": lambda: module("bracket").main(),
         "batch": lambda: module("batch").main(mapping=mapping),
         **equations,

@@ -27,7 +27,7 @@ def main(
         write_obj(iga_nn.sample("bumpy_ball"), mesh)
     try:
         surface = iga_nn.load_surface(mesh)
-    except iga_nn.MeshError as error:  # open, not manifold, with a handle, ...: one line that says what and where
+    except iga_nn.MeshError as error:  # open, not manifold, in pieces, ...: one line that says what and where
         sys.exit(str(error))
     print(f"{len(surface.vertices)} vertices, {len(surface.faces)} faces, volume {surface.volume:.4g}")
     for notice in surface.notices:  # what was mended

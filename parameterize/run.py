@@ -60,8 +60,9 @@ class Parameterization(Brief):
         Where the network was trained.
     seed : int
     config : Config
-    origin : "network", "growth" or "extension"
-        Where the map comes from: the trained network, a cube that grew, or an extended layout of the surface.
+    origin : "network", "growth", "extension" or "blocks"
+        Where the map comes from: the trained network, a cube that grew, an extended layout of the surface, or blocks
+        along the skeleton.
     attempts : tuple of AttemptReport
         The starts that were tried, in their order, with rounds and seconds by phase and the faults of their maps.
     refinement : Refinement or None

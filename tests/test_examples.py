@@ -130,6 +130,17 @@ def test_a_plate_with_a_hole_has_three_times_the_stress(tmp_path, capsys):
     assert float(top) == pytest.approx(3.0, rel=5e-3) and float(side) == pytest.approx(-1.0, rel=5e-3)
 
 
+def test_a_pulled_ring_of_blocks_is_near_the_formula_of_a_thick_ring(tmp_path, capsys):
+    """The largest stress is at the inner side; elsewhere the beam theory itself is off by some percent of it."""
+    assert shown(load("pulled_ring").main(tmp_path, iga_nn.preset("fast").scaled(0.3)))
+    out = capsys.readouterr().out
+    assert "4 blocks, 4 interfaces" in out and "in 4 patches: certified" in out
+    found, theory = np.array(re.findall(r"(-?[\d.]+) times the force, thick ring (-?[\d.]+)", out), dtype=float).T
+    assert found[0] == pytest.approx(theory[0], rel=0.03)
+    assert abs(found - theory).max() < 0.05 * theory[0]
+    assert shown(tmp_path / "blocks.png")
+
+
 def test_own_law_has_the_rates_of_its_degree_on_any_volume(tmp_path, capsys):
     benchmark_volume(2).save(tmp_path / "volume.npz")
     assert shown(load("own_law").main(tmp_path / "volume.npz", tmp_path))
