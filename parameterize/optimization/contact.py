@@ -25,6 +25,8 @@ _GAP = 1e-3  # between sheets, in a domain of volume 1: the check of the boundar
 _WEIGHT = 10.0  # times that of the distance from the surface, whose data hold the sheets where they are
 _SAMPLES = 110  # a direction and face of one cube
 _CANDIDATES = 256  # nearest samples among which one that faces the opposite way is looked for
+_OPPOSITE = -0.5  # cosine of the angle between the normals of opposite samples, at most
+_CROSSES = 0.3  # the same of samples on different blocks
 _CHUNK = 4096  # samples at a time, which take some 40 MB
 _REACH = 0.05  # distance from a contact, in a domain of volume 1, within which a round's steps look for others
 _ACCURACY = 2.0  # of the fast winding number
@@ -92,7 +94,7 @@ def contact_penalty(spline: SplineMap, gap: float = _GAP, near: IntArray | None 
         outside = boundary.points[asked] + gap * normals[asked]  # just outside, yet the boundary may wind around it
         touching = asked[winding.winding_number(outside, _ACCURACY) > 0.5]
     near = _around(boundary.points, touching) if near is None else near
-    touching, facing = _facing_samples(boundary.points, normals, touching)
+    touching, facing = _facing_samples(boundary.points, normals, boundary.patches, touching)
     first, second = (
         SlidingParameters(spline.nets, boundary.parameters[chosen], boundary.sample_faces[chosen])
         for chosen in (touching, facing)
@@ -122,16 +124,19 @@ def _around(points: Array, touching: IntArray) -> IntArray:
     return np.flatnonzero(np.isfinite(cKDTree(points[touching]).query(points, distance_upper_bound=_REACH)[0]))
 
 
-def _facing_samples(points: Array, normals: Array, touching: IntArray) -> tuple[IntArray, IntArray]:
+def _facing_samples(points: Array, normals: Array, blocks: IntArray, touching: IntArray) -> tuple[IntArray, IntArray]:
     """Return the samples of `touching` that have an opposite sample near them, and the nearest opposite one: (k,) each.
 
-    Two samples are opposite where their normals point in opposite directions.
+    Two samples are opposite where their normals point in opposite directions; on different blocks, also where these are
+    nearly perpendicular, as on both sides of an edge from which two rods leave a junction.
     """
     tree, nearest = cKDTree(points), np.full(len(touching), -1)
     for start in range(0, len(touching), _CHUNK):
         chunk = slice(start, start + _CHUNK)
         near = np.asarray(tree.query(points[touching[chunk]], k=_CANDIDATES)[1])  # (k, candidates), nearest first
-        opposite = np.einsum("kc,knc->kn", normals[touching[chunk]], normals[near]) < -0.5
+        cosines = np.einsum("kc,knc->kn", normals[touching[chunk]], normals[near])
+        other = blocks[near] != blocks[touching[chunk], None]
+        opposite = cosines < np.where(other, _CROSSES, _OPPOSITE)
         first = near[np.arange(len(near)), opposite.argmax(axis=1)]
         nearest[chunk] = np.where(opposite.any(axis=1), first, -1)
     found = nearest >= 0
