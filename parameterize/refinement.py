@@ -1,5 +1,6 @@
 """Inserts knots where a map needs them and optimises further, until its boundary is close enough to the surface.
 
+Each direction of each block has knots of its own, as far as interfaces allow: on both sides they are the same.
 Knots that are inserted leave a map as it is, so each further spline stage starts from the map of the stage before.
 What it finds is kept where no less is proved of it; else the map before is the result, and that is said.
 """
@@ -27,10 +28,14 @@ from .optimization.surface_distance import SurfaceFit
 from .optimization.term import Weights
 from .progress import History, ProgressCallback
 from .quality.distortion import arap_grid
+from .quality.own_box import box_lengths
 from .quality.two_sided import two_sided
 from .spline.bspline import breakpoints, midpoints
+from .spline.directions import tied_spans
+from .spline.multipatch import shared_numbers
+from .spline.nets import Nets
 from .spline.spline_map import SplineMap
-from .spline.volume import BSplineVolume
+from .spline.volume import AXES
 
 _log = logging.getLogger(__name__)
 _CHECKPOINT = "knots"
@@ -48,15 +53,16 @@ Stop = Literal["tolerance met", "limit reached", "no better map"]
 
 @dataclass(frozen=True)
 class Level:
-    """Describe a map: its control points a direction, its distance from the surface, and the rounds on its knots.
+    """Describe a map: its control points, its distance from the surface, and the rounds on its knots.
 
-    distance, largest: between surface and spline, both ways, over the diagonal of the surface's bounding box; root mean
-    square, and the largest of all samples. unproved: the number of spans on which det J > 0 is not proved. rounds,
-    seconds: the number of rounds and the wall seconds by phase, and their ending; empty for the map before the first
-    refinement, whose rounds belong to an attempt.
+    control_points: three numbers for one cube, one a direction; for several blocks one number, of the control points of
+    all blocks, those on interfaces once. distance, largest: between surface and spline, both ways, over the diagonal of
+    the surface's bounding box; root mean square, and the largest of all samples. unproved: the number of spans on which
+    det J > 0 is not proved. rounds, seconds: the number of rounds and the wall seconds by phase, and their ending;
+    empty for the map before the first refinement, whose rounds belong to an attempt.
     """
 
-    control_points: tuple[int, int, int]
+    control_points: tuple[int, int, int] | int
     distance: float
     largest: float
     unproved: int
@@ -65,7 +71,8 @@ class Level:
     ending: str = ""
 
     def __str__(self) -> str:
-        size = " x ".join(map(str, self.control_points))
+        found = self.control_points
+        size = f"{found:,}" if isinstance(found, int) else " x ".join(map(str, found))
         return f"{size} control points: distance {self.distance:.3g}, largest {self.largest:.3g} of the diagonal"
 
 
@@ -100,7 +107,7 @@ def refine(
     Each refinement has checkpoints of its own: the chosen knots, and those of its spline stage.
     """
     report: dict[str, Any] = {"history": history, "progress": progress}
-    spots = _Spots.of(found, fit)
+    spots, narrowest = _Spots.of(found, fit), _NARROWEST / np.array(found.spline.nets.spans)
     levels, dropped = [spots.level], None
     stopped: Stop = "tolerance met"
     for number in count(1):
@@ -108,11 +115,11 @@ def refine(
         if not any(found.faults) and levels[-1].distance <= refinement.tolerance:
             break
         kept = checkpoints.of_part(f"refined{number}")
-        finer = _chosen_knots(spots, config, refinement.max_control_points, kept)
-        if tuple(len(row) - config.degree - 1 for row in finer) == levels[-1].control_points:
+        finer = _chosen_knots(spots, refinement.max_control_points, narrowest, kept)
+        if Nets(config.degree, finer).shapes == found.spline.nets.shapes:
             stopped = "limit reached"
             break
-        other, surface, course = _optimized_on(finer, spots.volume, fit, config, weights, kept, report)
+        other, surface, course = _optimized_on(finer, found.spline, fit, config, weights, kept, report)
         spots = _Spots.of(other, surface, course)
         if (other.faults, spots.level.distance) >= (found.faults, levels[-1].distance):
             stopped, dropped = "no better map", spots.level
@@ -128,12 +135,13 @@ def refine(
 class _Spots:
     """A map at volume 1, with its distances and unproved spans, and their places.
 
-    places (n, 3), squares (n,): the parameters of samples on the surface and the spline, and their squared distances
-    times the areas they stand for.
+    places (n, 3), patches (n,), squares (n,): the parameters of samples on the surface and the spline, their blocks,
+    and their squared distances times the areas they stand for. unproved: (k, 4).
     """
 
-    volume: BSplineVolume
+    spline: SplineMap
     places: Array
+    patches: IntArray
     squares: Array
     unproved: IntArray
     level: Level
@@ -141,84 +149,109 @@ class _Spots:
     @classmethod
     def of(cls, found: Optimized, fit: SurfaceFit, course: Course | None = None) -> "_Spots":
         """Measure a map as the report does; course: of the rounds on its knots."""
-        volume = found.spline.volume
-        gaps = two_sided(volume, fit.points, fit.places.triangles)
+        spline, nets = found.spline, found.spline.nets
+        gaps = two_sided(spline.body, fit.points, fit.places.triangles)
         distance = gaps.summary().scaled(1.0 / float(np.linalg.norm(np.ptp(fit.points, axis=0))))
-        unproved = found.unproved[:, 1:]
-        level = Level(volume.shape, distance.rms, distance.max, len(unproved))
+        size = nets.shapes[0] if nets.one_cube else shared_numbers(nets.shapes, nets.interfaces)[1]
+        level = Level(size, distance.rms, distance.max, len(found.unproved))
         if course is not None:
             level = replace(level, rounds=dict(course.rounds), seconds=course.seconds, ending=str(course.ending))
         ways = (gaps.mesh_to_spline, gaps.spline_to_mesh)
-        places = np.concatenate([way.parameters for way in ways])
+        places, patches = (np.concatenate([getattr(way, name) for way in ways]) for name in ("parameters", "patches"))
         squares = np.concatenate([way.shares * way.distances**2 for way in ways])
-        return cls(volume, places, squares, unproved, level)
+        return cls(spline, places, patches, squares, found.unproved, level)
 
     def amounts(self, distortion_share: float) -> list[Array]:
-        """Return for each direction the amounts on each of its spans.
+        """Return for each direction of each block, block after block, the amounts on each of its spans.
 
         Unproved spans, where there are any; else squared distances, and distortion above the limit with a share.
         """
-        knots = self.volume.knots
+        nets = self.spline.nets
         if len(self.unproved):
-            n_spans = [len(np.unique(row)) - 1 for row in knots]
-            return [np.bincount(self.unproved[:, d], minlength=n).astype(float) for d, n in enumerate(n_spans)]
-        boundary = totals_along(self.places, self.squares / self.squares.sum(), knots)
-        points, (density,), weights = arap_grid(self.volume, n_gauss=2)
-        limit = ARAP_LIMIT * (1.0 + float(np.sum(weights * density)))
-        excess = weights * np.maximum(density - limit, 0.0) ** 2
-        grid = np.stack(np.meshgrid(*points, indexing="ij"), axis=-1).reshape(-1, 3)
-        stretched = totals_along(grid, distortion_share * excess.ravel() / max(float(excess.sum()), 1e-300), knots)
+            return [
+                np.bincount(self.unproved[self.unproved[:, 0] == block, 1 + axis], minlength=count).astype(float)
+                for block, counts in enumerate(nets.spans)
+                for axis, count in enumerate(counts)
+            ]
+        shares, boundary, stretched = self.squares / self.squares.sum(), list[Array](), list[Array]()
+        grids, excesses = zip(*map(self._excess, range(len(nets.knots)), _boxes(self.spline)), strict=True)
+        total = max(sum(float(excess.sum()) for excess in excesses), 1e-300)
+        for block, (knots, grid, excess) in enumerate(zip(nets.knots, grids, excesses, strict=True)):
+            own = self.patches == block
+            boundary += totals_along(self.places[own], shares[own], knots)
+            stretched += totals_along(grid, distortion_share * excess.ravel() / total, knots)
         return [a + b for a, b in zip(boundary, stretched, strict=True)]
+
+    def _excess(self, block: int, box: Array) -> tuple[Array, Array]:
+        """Return parameters (m, 3) in a block, and there the integrand of the squared distortion above the limit."""
+        points, (density,), weights = arap_grid(self.spline.patch(block), n_gauss=2, box=box)
+        limit = ARAP_LIMIT * (1.0 + float(np.sum(weights * density)))
+        excess = np.prod(box) * weights * np.maximum(density - limit, 0.0) ** 2
+        return np.stack(np.meshgrid(*points, indexing="ij"), axis=-1).reshape(-1, 3), excess
+
+
+def _boxes(spline: SplineMap) -> Array:
+    """Return the sides (blocks, 3) of the boxes against which distortion is measured: one cube, or each block's own."""
+    return np.ones((1, 3)) if spline.nets.one_cube else box_lengths(spline.body)
 
 
 def totals_along(places: Array, amounts: Array, knots: Knots) -> list[Array]:
-    """Return for each direction the amounts (m,) at places (m, 3) of the cube, summed over each of its spans."""
+    """Return for each direction the amounts (m,) at places (m, 3) of a block, summed over each of its spans."""
     return [np.histogram(places[:, axis], breakpoints(row), weights=amounts)[0] for axis, row in enumerate(knots)]
 
 
-def _chosen_knots(spots: _Spots, config: SplineConfig, most: int, checkpoints: Checkpoints) -> Knots:
-    """Return finer knots, those of the checkpoint where there is one, and keep them in a checkpoint.
+def _chosen_knots(spots: _Spots, most: int, narrowest: Array, checkpoints: Checkpoints) -> tuple[Knots, ...]:
+    """Return finer knots of each block, those of the checkpoint where there is one, and keep them in a checkpoint.
 
-    most: control points a direction.
+    most: control points a direction. narrowest: (blocks, 3).
     """
+    nets = spots.spline.nets
+    names = [[f"{axis}{block}" for axis in AXES] for block in range(len(nets.knots))]
     if (saved := checkpoints.load(_CHECKPOINT)) is not None:
-        u, v, w = (saved[0][axis] for axis in "uvw")
-        return u, v, w
-    narrowest = _NARROWEST / (config.control_points - config.degree)
-    amounts = spots.amounts(DISTORTION)
-    finer = halved_where_most(spots.volume.knots, amounts, np.array(spots.volume.shape), most, narrowest)
-    checkpoints.save(_CHECKPOINT, dict(zip("uvw", finer, strict=True)), {})
+        return tuple((saved[0][u], saved[0][v], saved[0][w]) for u, v, w in names)
+    finer = halved_where_most(nets, spots.amounts(DISTORTION), most, narrowest)
+    rows = {name: row for own, knots in zip(names, finer, strict=True) for name, row in zip(own, knots, strict=True)}
+    checkpoints.save(_CHECKPOINT, rows, {})
     return finer
 
 
-def halved_where_most(knots: Knots, amounts: list[Array], counts: IntArray, most: int, narrowest: float) -> Knots:
+def halved_where_most(nets: Nets, amounts: list[Array], most: int, narrowest: Array) -> tuple[Knots, ...]:
     """Return the knots with those spans halved on which most is found, the largest amounts of all directions first.
 
-    amounts: of each span, a direction. counts (3,): control points a direction, `most` at most. No span is halved any
-    more once `SHARE` of all amounts is on those that are, or the control points are `GROWTH` times as many; none into
-    halves below `narrowest`.
+    Spans that interfaces make one count together, and are halved together. amounts: of each span, a direction, block
+    after block. most: control points a direction. narrowest: (blocks, 3). No span is halved any more once `SHARE` of
+    all amounts is on those that are, or the control points are `GROWTH` times as many; none into halves below
+    `narrowest`.
     """
-    counts, total = counts.copy(), np.prod(counts)
-    halves = np.concatenate([np.diff(breakpoints(row)) / 2.0 for row in knots])
-    ranked = np.concatenate([np.stack([np.full(len(a), d), np.arange(len(a))], axis=1) for d, a in enumerate(amounts)])
-    values = np.concatenate(amounts)
-    chosen: tuple[list[int], ...] = ([], [], [])
-    reached, wanted = 0.0, SHARE * values.sum()
-    for place in np.argsort(-values, kind="stable"):
-        axis, span = ranked[place]
-        if reached >= wanted or np.prod(counts + (np.arange(3) == axis)) > GROWTH * total:
+    rows = [row for knots in nets.knots for row in knots]
+    owners = np.repeat(np.arange(len(rows)), [len(row) for row in amounts])
+    halves = np.concatenate([np.diff(breakpoints(row)) / 2.0 for row in rows])
+    is_wide = halves >= narrowest.ravel()[owners]
+    classes = np.concatenate(tied_spans(nets))
+    values = np.bincount(classes, np.concatenate(amounts))
+    counts = np.ravel(nets.shapes)
+    reached, wanted, total = 0.0, SHARE * values.sum(), _control_points(counts)
+    chosen = np.zeros(len(classes), dtype=bool)
+    for number in np.argsort(-values, kind="stable"):
+        members = classes == number
+        grown = counts + np.bincount(owners[members], minlength=len(counts))
+        if reached >= wanted or _control_points(grown) > GROWTH * total:
             break
-        if counts[axis] < most and halves[place] >= narrowest:
-            chosen[axis].append(span)
-            counts[axis] += 1
-        reached += values[place]
-    u, v, w = (np.sort(np.concatenate([row, midpoints(row)[spans]])) for row, spans in zip(knots, chosen, strict=True))
-    return u, v, w
+        if grown[owners[members]].max() <= most and is_wide[members].all():
+            chosen, counts = chosen | members, grown
+        reached += values[number]
+    finer = [np.sort(np.append(row, midpoints(row)[chosen[owners == d]])) for d, row in enumerate(rows)]
+    return tuple((finer[d], finer[d + 1], finer[d + 2]) for d in range(0, len(finer), 3))
+
+
+def _control_points(counts: IntArray) -> int:
+    """Return the number of control points of blocks, of which each direction has so many (3 blocks,)."""
+    return int(counts.reshape(-1, 3).prod(axis=1).sum())
 
 
 def _optimized_on(
-    finer: Knots,
-    volume: BSplineVolume,
+    finer: tuple[Knots, ...],
+    spline: SplineMap,
     fit: SurfaceFit,
     config: SplineConfig,
     weights: Weights,
@@ -228,11 +261,8 @@ def _optimized_on(
     """Insert the knots and continue with the rounds that follow those of a certified map; return their course, too."""
     phases = (Unfold(), Separate(), Polish(rounds=POLISH))
     schedule = Schedule(phases, FIRM_ROUNDS + ROUNDS, (LEAST_STEPS,) * (FIRM_ROUNDS + 2), gain=_GAIN)
-    start = volume.on_knots(finer)
-    first = SplineMap.of(start)
+    first = spline.on_knots(finer)
     surface = fit.on_nets(first.nets)
-    form = DeterminantForm(start)
-    nearly = np.flatnonzero(np.ldexp(form.survey()[0], form.exponent) < MIN_COEFFICIENT)
     found, course = optimize(
         first,
         surface,
@@ -241,8 +271,18 @@ def _optimized_on(
         replace(weights, surface=_CLOSER * weights.surface),
         checkpoints=checkpoints,
         begun=FIRM_ROUNDS,
-        watched=in_blocks([form.numbers(nearly)]),
+        watched=_nearly_folded(first),
         **report,
     )
     _log.info("the rounds end: %s; %s", course.ending, course.ending.sentence)
     return found, surface, course
+
+
+def _nearly_folded(spline: SplineMap) -> IntArray:
+    """Return the spans (k, 4) with a Bernstein coefficient of det J that the penalty would raise."""
+    found = []
+    for block, box in enumerate(_boxes(spline)):
+        form = DeterminantForm(spline.patch(block))
+        low = np.ldexp(form.survey()[0], form.exponent) < MIN_COEFFICIENT * np.prod(box)
+        found.append(form.numbers(np.flatnonzero(low)))
+    return in_blocks(found)

@@ -34,6 +34,12 @@ def test_it_is_said_how_many_and_why(words):
     assert reports.control_points_in_words({"parameterization": {}}) == ""
 
 
+def test_of_several_blocks_the_number_of_all_control_points_is_said():
+    blocks = Refinement(1e-3, 60, "tolerance met", (replace(LAST, control_points=2916),), None)
+    section = {"refinement": json.loads(json.dumps(asdict(blocks)))}
+    assert reports.control_points_in_words({"parameterization": section}).startswith("2,916; rms distance")
+
+
 def test_reports_of_older_versions_are_still_put_into_words():
     level = {"control_points": [30, 30, 30], "boundary": 9e-4, "unproved": 0}
     told = {"tolerance": 1e-3, "max_control_points": 60, "stopped": "tolerance met", "levels": [level], "dropped": None}

@@ -4,9 +4,11 @@ import pytest
 from parameterize import refinement
 from parameterize.refinement import halved_where_most, totals_along
 from parameterize.spline.bspline import breakpoints, open_uniform_knots
+from parameterize.spline.interface import Interface
+from parameterize.spline.nets import Nets
 
 KNOTS = tuple(open_uniform_knots(n, 3) for n in (7, 6, 5))  # 4, 3 and 2 spans
-COUNTS = np.array([7, 6, 5])
+COUNTS = (7, 6, 5)
 
 
 @pytest.fixture(autouse=True)
@@ -16,7 +18,7 @@ def no_limits(monkeypatch):
 
 
 def halved(amounts, most=60, narrowest=0.0):
-    found = halved_where_most(KNOTS, amounts, COUNTS, most, narrowest)
+    (found,) = halved_where_most(Nets(3, (KNOTS,)), amounts, most, np.full((1, 3), narrowest))
     return [np.setdiff1d(finer, row).tolist() for finer, row in zip(found, KNOTS, strict=True)]
 
 
@@ -56,3 +58,31 @@ def test_narrow_spans_are_not_halved():
 
 def test_nothing_found_means_nothing_halved():
     assert halved((np.zeros(4), np.zeros(3), np.zeros(2))) == [[], [], []]
+
+
+def rods(*interfaces):
+    """Two blocks of 3 x 2 x 4 and 2 x 3 x 1 spans; u of the one and v of the other are one along their interface."""
+    counts = ((6, 5, 7), (5, 6, 4))
+    return Nets(3, tuple(tuple(open_uniform_knots(n, 3) for n in row) for row in counts), interfaces)
+
+
+def test_spans_of_glued_blocks_are_halved_together_and_count_together(monkeypatch):
+    """The first span of u continues in the last span of v, as the faces lie on each other swapped and flipped."""
+    monkeypatch.setattr(refinement, "SHARE", 0.5)
+    nets = rods(Interface((0, "w1"), (1, "w0"), swapped=True, flipped=(True, False)))
+    amounts = [np.zeros(n) for n in (3, 2, 4, 2, 3, 1)]
+    amounts[0][0], amounts[4][2], amounts[2][1] = 2.0, 2.0, 3.0
+    one, other = halved_where_most(nets, amounts, 60, np.zeros((2, 3)))
+    new = [np.setdiff1d(finer, row) for finer, row in zip((*one, *other), sum(nets.knots, ()), strict=True)]
+    assert [len(row) for row in new] == [1, 0, 0, 0, 1, 0]
+    assert new[0][0] == pytest.approx(1 / 6) and new[4][0] == pytest.approx(5 / 6)
+
+
+def test_tied_spans_stay_where_one_of_them_would_exceed_the_limit_or_be_too_narrow():
+    nets = rods(Interface((0, "w1"), (1, "w0"), swapped=True))
+    amounts = [np.array([1.0, 0.0, 0.0]), *(np.zeros(n) for n in (2, 4, 2, 3, 1))]
+    for most, narrowest in ((5, np.zeros((2, 3))), (60, np.array([[0.0, 0.0, 0.0], [0.0, 0.2, 0.0]]))):
+        found = halved_where_most(nets, amounts, most, narrowest)
+        assert [len(row) for rows in found for row in rows] == [len(row) for rows in nets.knots for row in rows]
+    found = halved_where_most(nets, amounts, 7, np.full((2, 3), 0.15))
+    assert [len(row) - 4 for rows in found for row in rows] == [7, 5, 7, 5, 7, 4]

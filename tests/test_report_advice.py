@@ -74,6 +74,14 @@ def test_advice_knows_the_most_control_points_and_an_overlap():
     assert advice.in_words(overlapping)[0].endswith("(1, 2, 3)")
 
 
+def test_of_blocks_the_limit_of_auto_is_raised():
+    blocks = failed(patches=[{}, {}], control_points=2916)
+    assert advice.what_to_try(blocks, MapOptions()) == ["more control points: --control-points 40"]
+    assert advice.what_to_try(blocks, MapOptions(control_points="auto")) == [
+        "more control points: --max-control-points 70"
+    ]
+
+
 def test_a_surface_that_crosses_itself_is_the_first_suspect():
     crossing = failed() | {"input": {"self_intersections": {"pairs": 7}}}
     assert ": 7 pairs of its faces do" in advice.what_to_try(crossing)[0]

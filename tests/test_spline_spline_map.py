@@ -1,7 +1,8 @@
 import numpy as np
 import pytest
+from block_bodies import ring, sampled, wavy
 
-from parameterize.spline.bspline import greville, open_uniform_knots
+from parameterize.spline.bspline import greville, halved, open_uniform_knots
 from parameterize.spline.spline_map import SplineMap
 from parameterize.spline.volume import BSplineVolume
 
@@ -31,3 +32,11 @@ def test_a_linear_map_is_carried_to_any_knots():
     places = [np.linspace(0.0, 1.0, 5)] * 3
     values = SplineMap.on_cube(3, knots, cube).interpolated(finer).volume.grid(*places)
     assert values == pytest.approx(np.stack(np.meshgrid(*places, indexing="ij"), axis=-1), abs=1e-12)
+
+
+def test_inserted_knots_leave_a_map_of_blocks_as_it_is_and_glued_bit_by_bit():
+    spline = wavy(ring(turn=5, count=4), 0.02)
+    finer = spline.on_knots(tuple((halved(u), halved(v), halved(w)) for u, v, w in spline.nets.knots))
+    assert finer.nets.spans == ((6, 6, 6),) * 4 and len(finer.body.interfaces) == 4
+    assert np.array_equal(finer.control, finer.nets.merged(finer.control))
+    assert sampled(finer).points == pytest.approx(sampled(spline).points, abs=1e-12)

@@ -53,7 +53,8 @@ def what_to_try(report: Report, mapping: MapOptions | None = None) -> list[str]:
     if is_certified(report) or ("patches" in quality and mapping is None):  # several patches of a file
         return []
     if "patches" in quality and mapping is not None:
-        return [*_of_the_surface(report), *_more_control_points(mapping.most_control_points)]
+        kind = "max-" if mapping.control_points == "auto" else ""
+        return [*_of_the_surface(report), *_more_control_points(mapping.most_control_points, kind)]
     if mapping is not None and mapping.steps_factor < 1.0:
         remedies.append("the whole training: leave out --steps-factor")
     remedies += _of_the_surface(report)

@@ -151,7 +151,9 @@ def control_points_in_words(report: Report) -> str:
 
 
 def _size(level: Report) -> str:
-    return " x ".join(map(str, level["control_points"]))
+    """Return the number of control points of a map: of one cube in each direction, of several blocks in all."""
+    found = level["control_points"]
+    return f"{found:,}" if isinstance(found, int) else " x ".join(map(str, found))
 
 
 def surface_distance(report: Report) -> Report:

@@ -65,18 +65,18 @@ class BoxDistortion:
 
 
 def arap_grid(
-    volume: BSplineVolume, n_gauss: int = _N_GAUSS, scales: tuple[float, ...] = (1.0,)
+    volume: BSplineVolume, n_gauss: int = _N_GAUSS, scales: tuple[float, ...] = (1.0,), box: ArrayLike = (1.0, 1.0, 1.0)
 ) -> tuple[tuple[Array, Array, Array], list[Array], Array]:
     """Return the ARAP distortion of scale * F, for each of the scales, at `n_gauss` Gauss points a direction and span.
 
-    Returns the points of each axis, the values (m_u, m_v, m_w) for each scale, and the weights of the integral over the
-    cube.
+    box: sides (3,) of the box that the map is measured against. Returns the points of each axis, the values
+    (m_u, m_v, m_w) for each scale, and the weights of the integral over the cube.
     """
     rules = [gauss_points(k, n_gauss) for k in volume.knots]
     u, v, w = (points.ravel() for points, _ in rules)
     values = [np.empty((len(u), len(v), len(w))) for _ in scales]
     for slab, jacobians in _slabs(volume, rules):
-        for row, found in zip(values, _arap(jacobians, scales), strict=True):
+        for row, found in zip(values, _arap(jacobians / np.asarray(box), scales), strict=True):
             row[slab] = found
     weights = np.einsum("i,j,k->ijk", *(weights.ravel() for _, weights in rules))
     return (u, v, w), values, weights

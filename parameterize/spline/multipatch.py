@@ -257,15 +257,22 @@ def shared_numbers(
         (p, face_p), (q, face_q) = interface.first, interface.second
         first, second = face_layer(rows[p], face_p), interface.turned(face_layer(rows[q], face_q))
         pairs.append(np.stack([first.ravel(), second.ravel()]))
-    i, j = np.concatenate(pairs, axis=1)
-    graph = coo_array((np.ones(len(i), dtype=np.int8), (i, j)), shape=(starts[-1],) * 2)
+    numbers = numbers_of_classes(starts[-1], np.concatenate(pairs, axis=1))
+    return tuple(numbers[row] for row in rows), int(numbers.max()) + 1
+
+
+def numbers_of_classes(count: int, pairs: IntArray) -> IntArray:
+    """Return the class (count,) of each of `count` things, of which pairs (2, k) are one.
+
+    Classes have the numbers from 0 on, in the order in which their first members come.
+    """
+    graph = coo_array((np.ones(pairs.shape[1], dtype=np.int8), (pairs[0], pairs[1])), shape=(count,) * 2)
     _, first_places, groups = np.unique(
         connected_components(graph, directed=False)[1], return_index=True, return_inverse=True
     )
     order: IntArray = np.empty(len(first_places), dtype=np.int64)
     order[np.argsort(first_places)] = np.arange(len(first_places))
-    numbers = order[groups]
-    return tuple(numbers[row] for row in rows), len(order)
+    return order[groups]
 
 
 def _merged(patches: Sequence[BSplineVolume], labels: Sequence[IntArray]) -> tuple[BSplineVolume, ...]:

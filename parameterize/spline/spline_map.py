@@ -64,6 +64,12 @@ class SplineMap:
         """Return the map on the same knots with other control points (3, n)."""
         return replace(self, control=control)
 
+    def on_knots(self, knots: tuple[Knots, ...]) -> "SplineMap":
+        """Return the same map on finer knots of each block (knot insertion), equal at interfaces bit by bit."""
+        nets = replace(self.nets, knots=knots)
+        finer = (self.patch(block).on_knots(rows).control_points for block, rows in enumerate(knots))
+        return SplineMap(nets, nets.merged(nets.joined([np.moveaxis(points, -1, 0) for points in finer])))
+
     def interpolated(self, knots: Knots) -> "SplineMap":
         """Return the map of one cube on other knots that agrees with this one at their Greville points."""
         u, v, w = (greville(row, self.nets.degree) for row in knots)
