@@ -50,7 +50,8 @@ class MapOptions(SurfaceOptions):
         seed: equal seeds give equal volumes, bit for bit.
         device: where the network is trained; "auto" takes CUDA where it is available.
         control_points: number of control points per direction; "auto" starts with 30 and adds more where the distance
-            is large, for each direction apart, until it meets the tolerance or max_control_points is reached.
+            is large, for each direction apart, until it meets the tolerance or max_control_points is reached. Several
+            blocks have a fifth as many spans across each, at least 4.
         blocks: 1 for one cube, a larger number for at most so many blocks along the skeleton, or "auto": blocks for a
             body with handles or limbs, one cube for the others.
         corners: JSON file with a list of eight corners, in the order (0,0,0), (0,0,1), (0,1,0), ..., (1,1,1) of the

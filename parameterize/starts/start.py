@@ -8,10 +8,10 @@ from functools import cached_property
 from typing import Any, Literal
 
 from ..arrays import Array, IntArray, in_brackets
-from ..blocks.layout import BlockLayout, LayoutError, block_layout
+from ..blocks.layout import SPANS, BlockLayout, LayoutError, block_layout
 from ..checkpoint import Checkpoints
 from ..coarse import coarse_knots, optimize_coarse_first
-from ..config import Config
+from ..config import Config, SplineConfig
 from ..cube.cutting import subdivide_finely
 from ..cube.layout import CubeLayout
 from ..cube.sphere import lay_on_sphere
@@ -32,6 +32,7 @@ from ..surface.surface import Surface
 
 _log = logging.getLogger(__name__)
 
+FEWEST_SPANS = 4  # across a block: with fewer its section cannot become round
 COMPACT = 4.0  # cubed area of the surface over 36 pi, at volume 1: bodies with less have no long limbs, and most have
 # less, so that these need not wait for a skeleton
 Origin = Literal["network", "growth", "extension", "blocks"]
@@ -100,7 +101,8 @@ class Task:
     def layout(self) -> BlockLayout:
         """Return thin blocks along the skeleton. Raises SkeletonError and LayoutError where there are none."""
         surface, most = self.surface, self.config.blocks
-        found = block_layout(self.skeleton, surface.unit_vertices, surface.faces, where=self._where)
+        across = spans_across(self.config.spline.control_points)
+        found = block_layout(self.skeleton, surface.unit_vertices, surface.faces, across, self._where)
         if most is not None and len(found) > most:
             raise LayoutError(f"the skeleton needs {len(found)} blocks, and at most {most} are allowed: allow more")
         return found
@@ -125,6 +127,11 @@ class Task:
             vertex_weights(layout.points, layout.faces, layout.n_own),
             given_corners=None if self.given_corners is None else self.mesh[0][self.given_corners],
         )
+
+
+def spans_across(control_points: int) -> int:
+    """Return the spans across a block, in proportion to the control points a direction that one cube would have."""
+    return max(FEWEST_SPANS, round(SPANS * control_points / SplineConfig.control_points))
 
 
 @dataclass(frozen=True, eq=False)
