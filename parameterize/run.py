@@ -121,6 +121,7 @@ def parameterize(
     corners : (8, 3) array or (8,) array of int, optional
         The cube's corners on the surface: points in the surface's units, which take their nearest vertices, or vertex
         numbers; in the order (0,0,0), (0,0,1), (0,1,0), ..., (1,1,1). Chosen by the method where they are not given.
+        They are those of one cube: refused for a body with handles, and where `config.blocks` asks for several.
     progress : callable, optional
         Called with a `Progress` at every step.
     checkpoint_dir : str or Path, optional
@@ -160,7 +161,7 @@ def parameterize(
     if progress is not None and not callable(progress):
         raise TypeError(f"progress must be a function of a Progress, or None, got {progress!r:.80}")
     place, dtype = choose_device(device), choose_precision(dtype)
-    given = None if corners is None else corner_vertices(surface, corners)
+    given = given_corners(surface, corners, config)
     identity = identity_of(surface, config, seed=seed, device=place, dtype=dtype, corners=given)
     checkpoints = Checkpoints(None if checkpoint_dir is None else Path(checkpoint_dir), identity, resume=resume)
     history, seconds = History(), dict[str, float]()
@@ -236,6 +237,19 @@ def _checked(surface: Surface, config: Config | None, seed: int) -> tuple[Config
     if seed < 0:
         raise ValueError(f"seed must not be negative, got {seed}")
     return config or preset("fast"), int(seed)
+
+
+def given_corners(surface: Surface, corners: ArrayLike | None, config: Config) -> IntArray | None:
+    """Return the vertices (8,) of corners that a user gives, None where none are given.
+
+    Raises ValueError for bad corners, see `corner_vertices`, and where the map is not that of one cube.
+    """
+    if corners is None:
+        return None
+    if surface.genus or (config.blocks or 1) > 1:
+        why = f"this body has handles (genus {surface.genus})" if surface.genus else "several blocks are asked for"
+        raise ValueError(f"corners are those of one cube, and {why}: leave them out")
+    return corner_vertices(surface, corners)
 
 
 def corner_vertices(surface: Surface, corners: ArrayLike) -> IntArray:

@@ -405,6 +405,10 @@ def test_fetch_takes_the_model_from_the_data_folder(in_folder, monkeypatch):
         (["parameterize", "cube", "--corners", "seven.json"], "shape (7, 3)"),
         (["parameterize", "cube", "--corners", "numbers.json"], "vertex numbers"),
         (["parameterize", "cube", "--corners", "same.json"], "same vertex"),
+        (
+            ["parameterize", "cube", "--corners", "same.json", "--blocks", "5"],
+            "several blocks are asked for: leave them",
+        ),
         (["parameterize", "cube", "--corners", "scaled.json"], "XYZ must hold eight points"),
         (["parameterize", "cube", "--corners", "yes.json"], "eight points"),
         (["check", ""], "no surface is named"),

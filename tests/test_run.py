@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import torch
+from block_starts import torus
 from shapes import turned
 from small_run import STEPS, small_surface, tiny_config
 
@@ -19,6 +20,7 @@ from parameterize.cube.cutting import subdivide_finely
 from parameterize.optimization.phases import FIRM_ROUNDS
 from parameterize.run import corner_vertices, parameterize
 from parameterize.starts.start import MOST_POINTS
+from parameterize.surface.surface import surface_from_arrays
 from parameterize.training.backend import choose_device, choose_precision
 from parameterize.training.trainer import start_map
 
@@ -361,3 +363,11 @@ def test_the_start_map_makes_a_cloud_round():
     spread = np.cov((cloud @ matrix.T).T)
     assert spread == pytest.approx(np.trace(spread) / 3.0 * np.eye(3), abs=1e-9)
     assert np.allclose(matrix, matrix.T)
+
+
+def test_corners_are_refused_for_a_body_with_handles_and_for_several_blocks(surface):
+    ring = surface_from_arrays(*torus(around=16, across=8)[1:])
+    with pytest.raises(ValueError, match=r"corners are those of one cube, and this body has handles \(genus 1\)"):
+        parameterize(ring, tiny_config(), corners=np.arange(8))
+    with pytest.raises(ValueError, match="and several blocks are asked for: leave them out"):
+        parameterize(surface, tiny_config().with_blocks(5), corners=np.arange(8))

@@ -57,6 +57,7 @@ class MapOptions(SurfaceOptions):
         corners: JSON file with a list of eight corners, in the order (0,0,0), (0,0,1), (0,1,0), ..., (1,1,1) of the
             cube's: points of three coordinates in the surface's units, or vertex numbers counted from 0; or an object
             {"XYZ": [...]} with eight points in X, Y, Z, scaled to volume 1 about the middle of the bounding box.
+            Refused for a body with handles, and with blocks above 1.
         resume: continue from the checkpoint in the output folder.
         steps_factor: factor of the training steps of every stage; a small factor gives a quick look.
         tolerance: largest root mean square distance between surface and spline for control_points "auto", in both

@@ -67,7 +67,7 @@ def read_input(mesh: str | Path, mapping: MapOptions, finished: reports.Report |
     finished: the report of a result that may be that of this run. Then the device need not exist here, and "auto" is
     the device of that result, because another machine may have computed it.
     """
-    from parameterize.run import corner_vertices, identity_of
+    from parameterize.run import given_corners, identity_of
 
     config = mapping.config()
     if finished is None:
@@ -81,7 +81,7 @@ def read_input(mesh: str | Path, mapping: MapOptions, finished: reports.Report |
         surface = resolve(str(mesh), **mapping.reading())
     corners = read_corners(Path(mapping.corners), frame_of(surface)) if mapping.corners else None
     with input_errors():
-        vertices = None if corners is None else corner_vertices(surface, corners)
+        vertices = given_corners(surface, corners, config)
     marks = None if vertices is None else surface.vertices[vertices]
     return MapInput(
         surface, corners, marks, identity_of(surface, config, seed=mapping.seed, device=device, corners=vertices)
