@@ -22,16 +22,15 @@ STARTS: tuple[Start, ...] = (NETWORK, GROWTH, EXTENSION, STIFF, LAST)
 def starts_of(task: Task) -> tuple[Start, ...]:
     """Return the starts that suit the body and the options, in their order.
 
-    Raises LayoutError for one cube on a body with handles.
+    Raises LayoutError for one cube on a body with handles, SkeletonError for such a body without a skeleton.
     """
     if task.surface.genus and task.config.blocks == 1:
         raise LayoutError(
             f"genus {task.surface.genus}: one cube is never mapped one-to-one onto a body with handles; allow more"
         )
-    if task.surface.genus or (task.config.blocks or 1) > 1:
-        return (BLOCKS,)
-    on_one_cube = task.config.blocks == 1 or task.given_corners is not None or task.choice.division == "cube"
-    return STARTS if on_one_cube else (BLOCKS, *STARTS)
+    if task.choice.division == "cube":
+        return STARTS
+    return (BLOCKS,) if task.surface.genus or task.config.blocks is not None else (BLOCKS, *STARTS)
 
 
 def next_start(tried: tuple[Tried, ...], starts: tuple[Start, ...]) -> Start | None:

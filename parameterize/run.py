@@ -66,7 +66,10 @@ class Parameterization(Brief):
     attempts : tuple of AttemptReport
         The starts that were tried, in their order, with rounds and seconds by phase and the faults of their maps.
     refinement : Refinement or None
-        With config.refinement, how many control points each direction got, and why no more.
+        With config.refinement, how many control points each direction got, or all blocks together, and why no more.
+    division : str
+        Why the body was to become one cube or several blocks, in words, with the figures that decide; "" where the
+        options say it.
 
     Examples
     --------
@@ -89,6 +92,7 @@ class Parameterization(Brief):
     origin: Origin
     attempts: tuple[AttemptReport, ...]
     refinement: Refinement | None = None
+    division: str = ""
 
 
 def parameterize(
@@ -200,6 +204,7 @@ def parameterize(
         origin=start.origin,
         attempts=tuple(one.report() for one in tried),
         refinement=told,
+        division=task.choice.reason,
     )
 
 

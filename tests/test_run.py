@@ -365,6 +365,10 @@ def test_the_start_map_makes_a_cloud_round():
     assert np.allclose(matrix, matrix.T)
 
 
+def test_the_result_tells_why_the_body_is_one_cube(undisturbed):
+    assert undisturbed.division.startswith("no handles, and a compact body: ")
+
+
 def test_corners_are_refused_for_a_body_with_handles_and_for_several_blocks(surface):
     ring = surface_from_arrays(*torus(around=16, across=8)[1:])
     with pytest.raises(ValueError, match=r"corners are those of one cube, and this body has handles \(genus 1\)"):

@@ -1,9 +1,16 @@
 """What all starts share: the blocks along the skeleton, and their spans."""
 
+import logging
+
+import numpy as np
 import pytest
 from block_starts import torus
+from shapes import rounded_cube
 
+from parameterize.attempts import BLOCKS, STARTS, starts_of
 from parameterize.config import preset
+from parameterize.skeleton.choice import Choice
+from parameterize.starts import start
 from parameterize.starts.start import Task, spans_across
 from parameterize.surface.surface import surface_from_arrays
 
@@ -23,3 +30,39 @@ def test_the_blocks_of_a_torus_have_the_spans_of_the_options():
     for control_points, spans in ((30, 6), (40, 8)):
         layout = task_of(preset("fast").with_control_points(control_points)).layout
         assert {block.spans[:2] for block in layout.blocks} == {(spans, spans)}
+
+
+def test_why_a_body_with_handles_gets_blocks_is_told_and_logged(caplog):
+    caplog.set_level(logging.INFO)
+    task = task_of(preset("fast"))
+    assert starts_of(task) == (BLOCKS,) and task.choice.division == "blocks"
+    assert task.choice.reason.startswith("1 handle, thick branches: ") and task.choice.reason in caplog.messages
+    assert task.seconds["fit"] > 0.0
+
+
+def test_where_no_start_makes_what_was_chosen_that_is_said(monkeypatch):
+    monkeypatch.setattr(start, "choose", lambda _: Choice("body", "1 handle on a fat body: one block"))
+    task = task_of(preset("fast"))
+    assert starts_of(task) == (BLOCKS,)
+    assert (
+        task.choice.reason
+        == "1 handle on a fat body: one block, for which there is no start: blocks along the skeleton"
+    )
+
+
+def test_a_compact_body_gets_one_cube_without_a_skeleton(monkeypatch, caplog):
+    caplog.set_level(logging.INFO)
+    monkeypatch.setattr(start, "skeleton_of", lambda *_: pytest.fail("no skeleton is needed"))
+    task = task_of(preset("fast"), body=rounded_cube(200))
+    assert starts_of(task) == STARTS and "a compact body" in task.choice.reason and not caplog.messages
+
+
+def test_where_the_options_say_it_nothing_is_chosen():
+    body = rounded_cube(200)
+    for config, corners, starts in (
+        (preset("fast").with_blocks(1), None, STARTS),
+        (preset("fast").with_blocks(5), None, (BLOCKS,)),
+        (preset("fast"), np.arange(8), STARTS),
+    ):
+        task = task_of(config, corners, body)
+        assert starts_of(task) == starts and task.choice.reason == ""

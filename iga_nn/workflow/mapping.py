@@ -271,7 +271,8 @@ def _write(
         device=result.device,
         versions=reports.versions(),
         parameterization=with_unproved(result.quality.as_dict(), result.volume, result.certificate)
-        | {"origin": result.origin, "attempts": [asdict(attempt) for attempt in result.attempts]}
+        | {"origin": result.origin, "division": result.division}
+        | {"attempts": [asdict(attempt) for attempt in result.attempts]}
         | ({"refinement": asdict(result.refinement)} if result.refinement else {}),
     )
     tell(state, mapping)

@@ -29,6 +29,7 @@ from ..spline.nets import Nets
 from ..spline.spline_map import SplineMap
 from ..surface.geometry import normals_and_areas, vertex_quadrics, vertex_weights
 from ..surface.surface import Surface
+from ..threads import one_blas_thread
 
 _log = logging.getLogger(__name__)
 
@@ -82,20 +83,34 @@ class Task:
 
     @cached_property
     def choice(self) -> Choice:
-        """Return whether one cube or several blocks suit the body, and why.
+        """Return whether one cube or several blocks suit the body, and why; the reason is "" where the options say it.
 
-        The skeleton of a body without handles is looked for only where its surface is much larger than a ball's.
+        A body with handles gets blocks. The skeleton of one without handles is looked for only where its surface is
+        much larger than a ball's. Raises SkeletonError for a body with handles that has no skeleton.
         """
-        if self.surface.genus == 0:
-            area = float(normals_and_areas(self.surface.unit_vertices, self.surface.faces)[1].sum())
+        surface, most = self.surface, self.config.blocks
+        if surface.genus == 0:
+            if most is not None or self.given_corners is not None:
+                return Choice("blocks" if (most or 1) > 1 else "cube", "")
+            area = float(normals_and_areas(surface.unit_vertices, surface.faces)[1].sum())
             if (compactness := area**3 / (36.0 * math.pi)) < COMPACT:
                 return Choice("cube", f"no handles, and a compact body: {compactness:.1f} for a ball's 1: one cube")
+        with timed(self.seconds, "fit"), one_blas_thread():
+            found = self._by_skeleton()
+        _log.info("%s", found.reason)
+        return found
+
+    def _by_skeleton(self) -> Choice:
+        """Return the choice by the body's skeleton, as far as there is a start for it."""
         try:
-            return choose(self.skeleton)
+            found = choose(self.skeleton)
         except SkeletonError as error:
             if self.surface.genus:
                 raise
             return Choice("cube", f"no handles, and no skeleton ({error}): one cube")
+        if found.division == "body":
+            return Choice("blocks", f"{found.reason}, for which there is no start: blocks along the skeleton")
+        return found
 
     @cached_property
     def layout(self) -> BlockLayout:
