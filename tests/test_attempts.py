@@ -7,7 +7,8 @@ import pytest
 from small_run import small_surface, tiny_config
 
 from parameterize import attempts
-from parameterize.attempts import EXTENSION, GROWTH, LAST, NETWORK, STARTS, STIFF, next_start
+from parameterize.attempts import BLOCKS, EXTENSION, GROWTH, LAST, NETWORK, STARTS, STIFF, next_start, starts_of
+from parameterize.blocks.layout import LayoutError
 from parameterize.optimization.endings import Course, Reason
 from parameterize.run import parameterize
 from parameterize.starts.start import Attempt, Start
@@ -53,7 +54,30 @@ FOLDED, CROSSED = tried(NETWORK, 3), tried(NETWORK, meets=True)
     ],
 )
 def test_the_start_that_follows(before, following):
-    assert next_start(before) is following
+    assert next_start(before, STARTS) is following
+
+
+@pytest.mark.parametrize(
+    ("genus", "blocks", "division", "corners", "first"),
+    [
+        (1, None, None, None, (BLOCKS,)),
+        (0, 9, None, None, (BLOCKS,)),
+        (0, 1, None, None, STARTS),
+        (0, None, "cube", None, STARTS),
+        (0, None, "blocks", None, (BLOCKS, *STARTS)),
+        (0, None, "blocks", [0] * 8, STARTS),
+    ],
+)
+def test_bodies_with_handles_or_limbs_start_from_blocks(genus, blocks, division, corners, first):
+    options = {"surface": SimpleNamespace(genus=genus), "config": SimpleNamespace(blocks=blocks)}
+    task = SimpleNamespace(**options, given_corners=corners, choice=SimpleNamespace(division=division))
+    assert starts_of(task) == first
+
+
+def test_one_cube_is_refused_for_a_body_with_handles():
+    task = SimpleNamespace(surface=SimpleNamespace(genus=2), config=SimpleNamespace(blocks=1))
+    with pytest.raises(LayoutError, match="genus 2: one cube is never mapped one-to-one onto a body with handles"):
+        starts_of(task)
 
 
 def test_the_best_map_is_the_one_of_which_most_is_proved_then_the_nearest():

@@ -22,7 +22,7 @@ from solve.study import benchmark_volume
 
 DEFECTS = ("folds.png", "meeting.png")
 DRAW = {figure.file: f"iga_nn.figures.{figure.draw}" for figure in ARTIFACTS if figure.draw}  # file -> function
-OTHERS = ("named_faces.png", "regions.png", "study.png", "modes.png")
+OTHERS = ("blocks.png", "named_faces.png", "regions.png", "study.png", "modes.png")
 MAP = [file for file in DRAW if file not in (*DEFECTS, *OTHERS)]
 
 

@@ -167,10 +167,11 @@ def test_the_first_defect_is_named_by_its_place():
     assert str(caught.value).startswith("pierced: open surface: 1 boundary loop (3 edges)")
 
 
-def test_refuses_genus_one():
+def test_counts_handles():
     torus = trimesh.creation.torus(1.0, 0.3, major_sections=24, minor_sections=12)
-    with pytest.raises(MeshError, match=r"genus 1 \(1 handle\), expected 0: a cube has no handle"):
-        surface_from_arrays(torus.vertices, torus.faces)
+    surface = surface_from_arrays(torus.vertices, torus.faces)
+    assert surface.genus == 1 and surface.summary()["genus"] == 1
+    assert surface_from_arrays(*ball(subdivisions=1)).genus == 0
 
 
 def test_lists_components_and_takes_the_one_asked_for():

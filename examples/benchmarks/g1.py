@@ -180,6 +180,7 @@ def _options(argv: list[str] | None) -> Options:
         control_points=given.control_points,
         tolerance=given.tolerance,
         steps_factor=given.steps_factor,
+        blocks=1,  # as the paper's maps are
         resume=True,
     )
     if unknown:

@@ -48,6 +48,7 @@ REST = 1000.0  # libraries loaded, figures drawn
 # Products
 NEWTON_STEP, CERTIFICATE, FIT = 55.0, 270.0, 500.0
 EASY, HARD = (5, 13), (15, 20)  # rounds, and Newton steps a round, on all control points
+BLOCKS = (0.15, 0.75)  # of one cube's control points: what few blocks have, and many
 HARD_AFTER = (3, 14)  # rounds, and Newton steps a round, after each insertion of knots
 
 # Megabytes
@@ -95,7 +96,7 @@ def forecast(
     """Return the estimate for this machine under its present load.
 
     unknowns: the number of unknowns of the largest problem that is solved afterwards. A second start, where the first
-    map is not certified, takes the same time again.
+    map is not certified, takes the same time again. A body with handles has blocks, which are not trained.
     """
     from parameterize.training.backend import one_thread_an_operation
     from parameterize.training.effort import points_of_a_step
@@ -107,11 +108,13 @@ def forecast(
         product = _product_seconds(spline, clock) + CALLS * one_pass
     last = (REST + LAST_VERTEX * vertices + UNKNOWN * unknowns) * one_pass
     step = NEWTON_STEP * product + NEWTON_VERTEX * vertices * one_pass
+    in_blocks = surface.genus > 0
     fits = [
-        FIT * product + min(rounds, spline.rounds) * (min(steps, spline.steps) * step + CERTIFICATE * product)
-        for rounds, steps in (EASY, HARD)
+        share * (FIT * product + min(rounds, spline.rounds) * (min(steps, spline.steps) * step + CERTIFICATE * product))
+        for (rounds, steps), share in zip((EASY, HARD), BLOCKS if in_blocks else (1.0, 1.0), strict=True)
     ]
-    trainings = [count * TRAINING_STEP * points * one_pass for count in _training_steps(config)]
+    steps_of_training = (0, 0) if in_blocks else _training_steps(config)
+    trainings = [count * TRAINING_STEP * points * one_pass for count in steps_of_training]
     low, high = sorted(training + fit + last for training, fit in zip(trainings, fits, strict=True))
     most = spline.control_points
     if config.refinement is not None:  # it may end with the first spline, or only at its limit
