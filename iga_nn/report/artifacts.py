@@ -58,7 +58,9 @@ ARTIFACTS = (  # in the order of the pages
     Artifact(
         "solution.vtu", "solution", "the solution with stress, or gradient and flux, on linear cells for ParaView"
     ),
-    Artifact("boundary.npz", "map", "the map from the surface to the cube's faces", arrays=_BOUNDARY),
+    Artifact(
+        "boundary.npz", "map", "the map from the surface to the faces of the cube, or of blocks", arrays=_BOUNDARY
+    ),
     Artifact(PAGE, "report", "the report to read: verdict, figures, tables and an interactive view, in one file"),
     Artifact(REPORT, "report", "the report for programs: input, configuration, versions, certificate, errors, seconds"),
     Artifact("history.npz", "map", "the loss, its terms and the number of folded samples at every training step"),
@@ -67,9 +69,9 @@ ARTIFACTS = (  # in the order of the pages
     Artifact("solution.png", "solution", "the solution on the boundary and inside", "solution.draw_solution", _VALUES),
     Artifact("meeting.png", "map", "where the boundary meets itself", "map.draw_meeting", ("volume", "meeting")),
     Artifact("folds.png", "map", "where det J > 0 is not proved", "map.draw_folds", ("volume", "places")),
-    Artifact("faces.png", "map", "images of the cube's faces", "map.draw_faces", ("volume", "marks")),
+    Artifact("faces.png", "map", "images of the faces", "map.draw_faces", ("volume", "marks")),
     Artifact("blocks.png", "map", "the blocks drawn apart, and their interfaces", "blocks.draw_blocks", ("blocks",)),
-    Artifact("lines.png", "map", "parameter lines on the cube's faces", "map.draw_lines", ("volume",)),
+    Artifact("lines.png", "map", "parameter lines on the faces", "map.draw_lines", ("volume",)),
     Artifact("cut.png", "map", "the volume cut open, with the distortion inside", "map.draw_cut", ("volume",)),
     Artifact("distortion.png", "map", "distortion on three sections", "map.draw_distortion", ("volume",)),
     Artifact("history.png", "map", "loss over the training steps", "curves.draw_history", ("history",)),
