@@ -130,6 +130,7 @@ def test_a_plate_with_a_hole_has_three_times_the_stress(tmp_path, capsys):
     assert float(top) == pytest.approx(3.0, rel=5e-3) and float(side) == pytest.approx(-1.0, rel=5e-3)
 
 
+@pytest.mark.slow
 def test_a_pulled_ring_of_blocks_is_near_the_formula_of_a_thick_ring(tmp_path, capsys):
     """The largest stress is at the inner side; elsewhere the beam theory itself is off by some percent of it."""
     assert shown(load("pulled_ring").main(tmp_path, iga_nn.preset("fast").scaled(0.3)))

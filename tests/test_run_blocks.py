@@ -84,6 +84,7 @@ def test_a_run_of_blocks_is_reported(ring, in_folder, few_distances):
     assert len(report["parameterization"]["patches"]) == 4
 
 
+@pytest.mark.slow
 def test_large_surfaces_of_bodies_with_handles_are_fitted_on_a_copy(monkeypatch, options):
     from parameterize.surface import decimation
 
