@@ -99,6 +99,7 @@ def numbers(text, pattern):
     return [float(found) for found in re.findall(pattern, text)]
 
 
+@pytest.mark.slow
 def test_bracket_balances_its_load_and_is_near_beam_theory(tmp_path, capsys):
     assert shown(load("bracket").main(out=tmp_path))
     out = capsys.readouterr().out

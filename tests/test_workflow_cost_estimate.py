@@ -74,6 +74,7 @@ with one_thread_an_operation():
     assert done.stdout.split() == ["[1,", "1]"]
 
 
+@pytest.mark.slow
 def test_a_small_run_takes_what_was_said(in_folder):
     """In processor seconds, and resident memory, of a process of its own: other programs may keep this one waiting."""
     script = f"""
