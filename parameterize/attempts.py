@@ -43,9 +43,16 @@ def next_start(tried: tuple[Tried, ...], starts: tuple[Start, ...]) -> Start | N
     grown = tried[begun.index(GROWTH)].attempt if GROWTH in begun else None
     if STIFF in left and grown is not None and grown.distance > GROWTH.far:
         return STIFF
-    if not left or any(one.attempt is not None and not any(one.attempt.found.faults) for one in tried):
+    if not left or any(_serves(one) for one in tried):
         return None
     return STIFF if STIFF in left and grown is not None and grown.found.meets_itself else left[0]
+
+
+def _serves(one: Tried) -> bool:
+    """Return whether a map has no faults; one of blocks must be close to the surface, too, as one cube may be closer."""
+    if one.attempt is None or any(one.attempt.found.faults):
+        return False
+    return one.start is not BLOCKS or one.attempt.distance <= GROWTH.far
 
 
 def attempts(task: Task, checkpoints: Checkpoints) -> tuple[Tried, ...]:

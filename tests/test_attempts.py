@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from types import SimpleNamespace
+from unittest.mock import Mock, PropertyMock
 
 import pytest
 from small_run import small_surface, tiny_config
@@ -70,6 +71,21 @@ def test_the_start_that_follows(before, following):
 def test_bodies_with_handles_or_limbs_start_from_blocks(genus, blocks, division, first):
     options = {"surface": SimpleNamespace(genus=genus), "config": SimpleNamespace(blocks=blocks)}
     assert starts_of(SimpleNamespace(**options, choice=SimpleNamespace(division=division))) == first
+
+
+def test_where_no_blocks_fit_a_body_without_handles_one_cube_is_tried():
+    task = Mock(seconds={})
+    type(task).layout = PropertyMock(side_effect=LayoutError("too thin"))
+    task.surface.genus, task.config.blocks = 0, None
+    assert BLOCKS.make(task, None) is None
+    assert Tried(BLOCKS, None, {}).report().ending == "no blocks fit"
+    assert next_start((Tried(BLOCKS, None, {}),), (BLOCKS, *STARTS)) is NETWORK
+    assert next_start((tried(BLOCKS),), (BLOCKS, *STARTS)) is None
+    assert next_start((tried(BLOCKS, distance=FAR),), (BLOCKS, *STARTS)) is NETWORK
+    assert next_start((tried(BLOCKS, distance=FAR),), (BLOCKS,)) is None
+    task.config.blocks = 9
+    with pytest.raises(LayoutError, match="too thin"):
+        BLOCKS.make(task, None)
 
 
 def test_one_cube_is_refused_for_a_body_with_handles():

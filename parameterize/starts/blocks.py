@@ -5,12 +5,13 @@ branches of the curve skeleton, glued by whole faces at blocks where branches me
 out on them: its points take the nearest places on the blocks anew before each round (reassignment.py).
 """
 
+import logging
 from dataclasses import dataclass
 
 import numpy as np
 
 from ..arrays import Array
-from ..blocks.layout import Block, BlockLayout
+from ..blocks.layout import Block, BlockLayout, LayoutError
 from ..checkpoint import Checkpoints
 from ..config import Config, scaled_steps
 from ..cube.cutting import subdivide_finely
@@ -27,6 +28,8 @@ from ..threads import one_blas_thread
 from .growth import STEPS, Grow
 from .on_cube import MORE_ROUNDS
 from .start import MOST_POINTS, Attempt, Start, Task, optimized
+
+_log = logging.getLogger(__name__)
 
 _USUAL_STEPS = (20, 8, 8, 8)  # of Newton's method in the later rounds of most runs: tells the time left
 _FACE_SHARES = (1e-3, 1e-2, 0.1)  # of the weight of the surface's data while the faces are drawn to it, round by round
@@ -47,11 +50,19 @@ class Approach(Grow):
 class AlongSkeleton(Start):
     """Make a map of several blocks along the branches of the solid's skeleton."""
 
-    def make(self, task: Task, checkpoints: Checkpoints) -> Attempt:
-        """Lay thin blocks along the skeleton, draw them to the surface and return the attempt."""
-        spline = task.config.spline
+    def make(self, task: Task, checkpoints: Checkpoints) -> Attempt | None:
+        """Lay thin blocks along the skeleton, draw them to the surface and return the attempt.
+
+        None is returned where no blocks fit into a body that one cube may suit, too, and other starts follow.
+        """
         with timed(task.seconds, "fit"), one_blas_thread():
-            first = thin_blocks(task.layout, spline.degree)
+            try:
+                first = thin_blocks(task.layout, task.config.spline.degree)
+            except LayoutError as error:
+                if task.surface.genus or task.config.blocks is not None:
+                    raise
+                _log.warning("%s", error)
+                return None
             fit = _surface_fit(task, first)
         return optimized(first, fit, schedule(task.config), task, checkpoints)
 

@@ -51,6 +51,8 @@ class Tried:
     @property
     def fault(self) -> str:
         """Return why another start follows, in words for the log and for report.json."""
+        if self.attempt is None and self.start.origin == "blocks":
+            return "no blocks fit"
         if self.attempt is None:
             return "hard for the network" if "train" in self.seconds else "not trained"
         found = self.attempt.found
