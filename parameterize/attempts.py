@@ -49,7 +49,7 @@ def next_start(tried: tuple[Tried, ...], starts: tuple[Start, ...]) -> Start | N
 
 
 def _serves(one: Tried) -> bool:
-    """Return whether a map has no faults; one of blocks must be close to the surface, too, as one cube may be closer."""
+    """Return whether a map has no faults, and, where it has blocks, is close to the surface: one cube may be closer."""
     if one.attempt is None or any(one.attempt.found.faults):
         return False
     return one.start is not BLOCKS or one.attempt.distance <= GROWTH.far
