@@ -62,6 +62,7 @@ def size_of(spline):
     return shared_numbers(spline.nets.shapes, spline.nets.interfaces)[1]
 
 
+@pytest.mark.slow
 def test_knots_are_inserted_into_blocks_until_the_limit_and_the_boundary_comes_closer():
     found, fit, told = limited()
     assert told.stopped == "limit reached" and len(told.levels) > 1 and told.dropped is None

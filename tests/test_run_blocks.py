@@ -45,6 +45,7 @@ def test_a_ring_becomes_certified_blocks_in_its_own_units(ring, undisturbed):
     assert attempt.start == "blocks" and attempt.rounds["approach"] == len(starts._FACE_SHARES)
 
 
+@pytest.mark.slow
 def test_interrupted_and_resumed_gives_the_same_blocks(ring, options, undisturbed, tmp_path):
     def interrupt(state):
         if state.step > 2 * options["config"].spline.steps:  # in the third round
