@@ -27,8 +27,7 @@ from .optimization.spans import in_blocks
 from .optimization.surface_distance import SurfaceFit
 from .optimization.term import Weights
 from .progress import History, ProgressCallback
-from .quality.distortion import arap_grid
-from .quality.own_box import box_lengths
+from .quality.distortion import arap_grid, own_boxes
 from .quality.two_sided import two_sided
 from .spline.bspline import breakpoints, midpoints
 from .spline.directions import tied_spans
@@ -192,7 +191,7 @@ class _Spots:
 
 def _boxes(spline: SplineMap) -> Array:
     """Return the sides (blocks, 3) of the boxes against which distortion is measured: one cube, or each block's own."""
-    return np.ones((1, 3)) if spline.nets.one_cube else box_lengths(spline.body)
+    return np.ones((1, 3)) if spline.nets.one_cube else own_boxes(spline.body)
 
 
 def totals_along(places: Array, amounts: Array, knots: Knots) -> list[Array]:

@@ -6,7 +6,7 @@ from block_bodies import BODIES, fan, rod, uniform_nets
 
 from parameterize.optimization.adjacent_faces import next_faces
 from parameterize.optimization.sliding import SlidingParameters, fold_over_edges
-from parameterize.quality.own_box import box_lengths
+from parameterize.quality.distortion import own_boxes
 
 TURNS = (0, 5, 7, 11)
 
@@ -104,7 +104,7 @@ def test_a_slide_from_block_to_block_stays_at_its_place_in_space(turn):
     parameters[:, 0], parameters[:, 1] = rng.uniform(0.97, 1.0, count), 1.0
     faces = np.full(count, 3)  # v1 of the first block, which is not turned
     places = SlidingParameters(nets, parameters, faces)
-    places.measure_in(box_lengths(spline.body))
+    places.measure_in(own_boxes(spline.body))
     goals = spline.patch(0)(parameters) + np.column_stack([np.full(count, 0.04), np.zeros((count, 2))])
     places.slide(spline.control, goals)
     assert (places.cube_faces // 6 == 1).all()

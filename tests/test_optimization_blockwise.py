@@ -13,7 +13,7 @@ from parameterize.optimization.distortion import Distortion
 from parameterize.optimization.energy import SplineEnergy
 from parameterize.optimization.spans import in_blocks
 from parameterize.optimization.term import Weights
-from parameterize.quality.own_box import box_lengths
+from parameterize.quality.distortion import own_boxes
 from parameterize.spline.spline_map import SplineMap
 from parameterize.spline.volume import BSplineVolume
 
@@ -92,7 +92,7 @@ def test_newton_direction_leads_down_and_opens_no_gap():
 def test_straight_blocks_in_their_own_boxes_have_no_distortion():
     spline = rod(7, lengths=(1.0, 2.0, 0.6))
     nets = spline.nets
-    own = Distortion(nets, stretched(nets, box_lengths(spline.body)))
+    own = Distortion(nets, stretched(nets, own_boxes(spline.body)))
     assert own.energy_and_gradient(spline.control)[0] == pytest.approx(0.0, abs=1e-20)
     assert Distortion(nets, nets.knots).energy_and_gradient(spline.control)[0] > 0.1
 
@@ -122,7 +122,7 @@ def test_terms_of_a_cut_block_are_those_of_the_whole():
 @pytest.mark.parametrize("name", BODIES)
 def test_determinants_are_the_shortfalls_of_the_certificates_coefficients(name):
     spline = wavy(BODIES[name](7), 0.12)
-    nets, boxes = spline.nets, box_lengths(spline.body)
+    nets, boxes = spline.nets, own_boxes(spline.body)
     penalty, spans = DeterminantPenalty(nets, stretched(nets, boxes), 0.8), all_spans(spline.nets)
     penalty.activate(spans[::2])
     weights = np.random.default_rng(0).uniform(0.5, 2.0, len(spans)) * penalty.weights

@@ -2,10 +2,19 @@
 
 import numpy as np
 import pytest
+from block_bodies import rod
 from patches import SYMMETRIES, turned
 
 from parameterize.quality import distortion as module
-from parameterize.quality.distortion import arap, arap_grid, arap_in_box, in_own_box, own_box, scaled_jacobian
+from parameterize.quality.distortion import (
+    arap,
+    arap_grid,
+    arap_in_box,
+    in_own_box,
+    own_box,
+    own_boxes,
+    scaled_jacobian,
+)
 from parameterize.spline.bspline import greville, open_uniform_knots
 from parameterize.spline.volume import BSplineVolume
 
@@ -118,3 +127,26 @@ def test_own_box_does_not_depend_on_how_parameters_run(symmetry, monkeypatch):
     assert (other.arap.mean, other.arap.max) == pytest.approx((found.arap.mean, found.arap.max), rel=1e-9)
     monkeypatch.setattr(module, "_SLAB_POINTS", 500)
     assert in_own_box(volume).arap.mean == pytest.approx(found.arap.mean, rel=1e-12)
+
+
+def test_lengths_of_an_affine_block_are_those_of_the_columns_of_its_matrix():
+    knots = tuple(open_uniform_knots(n, 3) for n in (5, 6, 8))
+    places = np.stack(np.meshgrid(*(greville(row, 3) for row in knots), indexing="ij"), axis=-1)
+    matrix = np.array([[2.0, 0.3, 0.0], [0.0, 0.5, 0.4], [0.0, 0.1, 3.0]])
+    lengths = own_boxes(BSplineVolume((3, 3, 3), knots, places @ matrix.T + 7.0))
+    assert lengths == pytest.approx(np.linalg.norm(matrix, axis=0)[None], rel=1e-12)
+
+
+def test_lengths_follow_the_directions_of_turned_blocks():
+    lengths = own_boxes(rod(7, lengths=(1.0, 2.0, 0.7)).body)
+    assert lengths.shape == (3, 3)
+    assert lengths[0] == pytest.approx([1.0, 0.5, 0.8])
+    assert not np.allclose(lengths[1], [2.0, 0.5, 0.8])  # a direction of the block is another one in space
+    assert np.sort(lengths[1]) == pytest.approx([0.5, 0.8, 2.0])
+    assert np.sort(lengths[2]) == pytest.approx([0.5, 0.7, 0.8])
+
+
+def test_the_mean_of_a_derivative_that_varies():
+    volume = BSplineVolume.from_function(lambda u, v, w: (u + u**2, v, w * (1.0 + v)), 6)
+    assert own_boxes(volume)[0, 0] == pytest.approx(2.0, rel=1e-12)
+    assert own_boxes(volume)[0, 2] == pytest.approx(1.5, rel=1e-12)

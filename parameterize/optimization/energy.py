@@ -11,7 +11,7 @@ import numpy as np
 
 from ..arrays import Array, Floats, IntArray
 from ..conjugate_gradients import conjugate_gradients
-from ..quality.own_box import box_lengths
+from ..quality.distortion import own_boxes
 from ..spline.nets import Nets
 from ..spline.spline_map import SplineMap
 from .bending import Fairness
@@ -103,7 +103,7 @@ class SplineEnergy:
         """
         self._round = RoundWeights(penalty, self._weights.surface * (1.0 if share is None else share))
         if not self.nets.one_cube:
-            self._measure_in(box_lengths(SplineMap(self.nets, control).body))
+            self._measure_in(own_boxes(SplineMap(self.nets, control).body))
             reassign(self.surface, control, first=by_faces)
             self._approach = faces_towards(self.surface, control) if by_faces else None
         self.distortion.start_round(control, penalty)

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from ..arrays import Array
 from ..spline.bspline import gauss_points
+from ..spline.multipatch import MultiPatch, as_multipatch
 from ..spline.orientation import mirrored, orientation
 from ..spline.volume import BSplineVolume
 from .rotations import closest_rotations
@@ -101,6 +102,11 @@ def own_box(volume: BSplineVolume) -> Array:
     """Return the sides (3,) of a volume's own box: the mean lengths of F_u, F_v and F_w over the cube."""
     rules = [gauss_points(k, _N_GAUSS) for k in volume.knots]
     return _mean_lengths(volume, rules, np.einsum("i,j,k->ijk", *(weights.ravel() for _, weights in rules)))
+
+
+def own_boxes(body: BSplineVolume | MultiPatch) -> Array:
+    """Return the sides (patches, 3) of the own box of each patch."""
+    return np.array([own_box(patch) for patch in as_multipatch(body)])
 
 
 def _mean_lengths(volume: BSplineVolume, rules: Rules, weights: Array) -> Array:

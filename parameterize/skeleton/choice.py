@@ -14,7 +14,7 @@ TUBE_OF_LIMBS = 0.7  # without handles one cube is possible, and is left for a b
 # of round limbs have .75 to .97, and one with a fat trunk that the curves do not fill (a bunny) .65 and less
 TUBE_OF_HANDLES = 0.4  # sections up to twice as wide as thick are pulled out of square rods
 SHELL = 0.1  # a wall that is bent around a void has less, and has no curve in its middle
-LONG = 7.5  # median radii of the longest limb, to the middle of its junction: nearly four diameters
+LONG = 10.0  # median radii of the longest limb, to the middle of its junction: five diameters
 RING = 0.2  # reach over the length of all curves: rings of blocks nearly as wide as they are long around have .17, a
 # plate with one hole .15, a cup with a handle .28
 
