@@ -51,18 +51,19 @@ class SplineEnergy:
         self._approach: SurfaceFit | None = None
         self._weights, self._grows = weights, False
         self._round = RoundWeights(0.0, weights.surface)
-        self.determinants = DeterminantPenalty(nets, nets.knots)
-        self._measure_in(np.ones((len(nets.knots), 3)))
+        self._measure_in(np.ones((len(nets.knots), 3)), np.zeros(int(nets.first_spans[-1])))
 
-    def _measure_in(self, boxes: Array) -> None:
-        """Make the terms of the solid, in which each block has the side lengths `boxes` (blocks, 3)."""
+    def _measure_in(self, boxes: Array, span_weights: Array) -> None:
+        """Make the terms of the solid, in which each block has the side lengths `boxes` (blocks, 3).
+
+        span_weights: (m,), the weights of all spans in the penalty on det J.
+        """
         nets = self.nets
         knots = tuple((u * a, v * b, w * c) for (u, v, w), (a, b, c) in zip(nets.knots, boxes, strict=True))
         self.surface.places.measure_in(boxes)
         self.distortion, self.fairness = Distortion(nets, knots), Fairness(nets, knots, self._weights.fairness)
-        before = self.determinants.weights
         self.determinants = DeterminantPenalty(nets, knots)
-        self.determinants.weigh(before)
+        self.determinants.weigh(span_weights)
         self.inner: tuple[Term, ...] = (self.distortion, self.fairness, self.determinants)
         self._precondition = self._preconditioner()
 
@@ -103,7 +104,7 @@ class SplineEnergy:
         """
         self._round = RoundWeights(penalty, self._weights.surface * (1.0 if share is None else share))
         if not self.nets.one_cube:
-            self._measure_in(own_boxes(SplineMap(self.nets, control).body))
+            self._measure_in(own_boxes(SplineMap(self.nets, control).body), self.determinants.weights)
             reassign(self.surface, control, first=by_faces)
             self._approach = faces_towards(self.surface, control) if by_faces else None
         self.distortion.start_round(control, penalty)
