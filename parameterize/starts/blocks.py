@@ -63,22 +63,24 @@ class AlongSkeleton(Start):
                     raise
                 _log.warning("%s", error)
                 return None
-            fit = _surface_fit(task, first)
+            fit = surface_fit(task, first)
         return optimized(first, fit, schedule(task.config), task, checkpoints)
 
 
 BLOCKS = AlongSkeleton("blocks", "blocks", "laying blocks along the skeleton")
 
 
-def schedule(config: Config) -> Schedule:
+def schedule(
+    config: Config, face_shares: tuple[float, ...] = _FACE_SHARES, point_shares: tuple[float, ...] = _POINT_SHARES
+) -> Schedule:
     """Return the phases of the rounds: all faces are drawn to the surface at first, then the surface's points draw F.
 
-    Both do so with a growing weight.
+    Both do so with a growing weight, whose shares are given round by round.
 
     Folded maps are not given up for their distance: places are assigned anew in each round.
     """
-    shares, steps = _FACE_SHARES + _POINT_SHARES, scaled_steps(STEPS, config.steps_factor)
-    growing = Approach(shares=_FACE_SHARES, steps=steps), Grow(shares=shares, steps=steps)
+    shares, steps = face_shares + point_shares, scaled_steps(STEPS, config.steps_factor)
+    growing = Approach(shares=face_shares, steps=steps), Grow(shares=shares, steps=steps)
     phases = *growing, Unfold(far=_FAR, far_first=_FAR), Separate(far=_FAR), Polish()
     return Schedule(phases, len(shares) + config.spline.rounds + MORE_ROUNDS, (steps,) * len(shares) + _USUAL_STEPS)
 
@@ -98,7 +100,7 @@ def _points(block: Block, rows: list[Array]) -> Array:
     return np.moveaxis(block.points(places), -1, 0)
 
 
-def _surface_fit(task: Task, first: SplineMap) -> SurfaceFit:
+def surface_fit(task: Task, first: SplineMap) -> SurfaceFit:
     """Return the surface's points, each with its first place on the blocks."""
     surface = task.surface
     points, faces = subdivide_finely(surface.unit_vertices, surface.faces, _LONGEST, task.own + MOST_POINTS)

@@ -1,0 +1,114 @@
+"""Starts from one block for a fat body, with stubs for its thin handles on the faces.
+
+The handles are cut off, the body without them is mapped as one cube, and rods are laid along the handles from face to
+face. The body is cut into blocks there, so that a rod is glued to a whole face.
+"""
+
+import logging
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from ..arrays import Array
+from ..blocks.inside import Body
+from ..blocks.layout import BlockLayout
+from ..checkpoint import Checkpoints
+from ..handles.cutting import without_handles
+from ..handles.layout import Footprint, footprint, stub_layout
+from ..handles.pieces import handles_of
+from ..optimization.reassignment import boundary_samples
+from ..progress import timed
+from ..spline.bspline import greville, open_uniform_knots
+from ..spline.interface import face_layer
+from ..spline.nets import Nets
+from ..spline.spline_map import SplineMap
+from ..spline.volume import BSplineVolume
+from ..surface.surface import surface_from_arrays
+from ..threads import one_blas_thread
+from ..training.samples import interior_points
+from .blocks import schedule, surface_fit
+from .growth import GROWTH, STIFF
+from .start import MOST_POINTS, Attempt, Start, Task, optimized
+
+_log = logging.getLogger(__name__)
+
+_CELL = 0.03  # of the lattice whose points tell the areas of sections, at volume 1
+_CONTROL_POINTS = 18  # a direction of the body's first map: it is optimised again with its handles
+_FACE_SHARES = (0.1,)  # as those of blocks along the skeleton: the body is there, only its handles have some way to go
+_POINT_SHARES = (0.1,)
+_A_SPAN = 4  # samples of the body's faces among which rims find their places
+
+
+@dataclass(frozen=True)
+class WithStubs(Start):
+    """Make a map of a body as one cube, cut into blocks, and of its handles as rods on their faces."""
+
+    def make(self, task: Task, checkpoints: Checkpoints) -> Attempt | None:
+        """Map the body without its handles, lay rods for these, and return the attempt with all blocks.
+
+        None is returned where the body has no such handles.
+        """
+        surface = task.surface
+        with timed(task.seconds, "fit"), one_blas_thread():
+            inside = interior_points(surface.unit_vertices, surface.faces, _CELL)
+            handles = handles_of(task.skeleton, inside)
+            found = handles and without_handles(
+                surface.unit_vertices, surface.faces, task.skeleton, handles, task.own + MOST_POINTS
+            )
+        if not found:
+            return None
+        vertices, faces, rims = found
+        body = _of_body(task, vertices, faces, checkpoints)
+        with timed(task.seconds, "fit"), one_blas_thread():
+            ends = [(_footprint(body, first), _footprint(body, last)) for first, last in rims]
+            solid = Body(surface.unit_vertices, surface.faces)
+            first = _first(*stub_layout(body.volume, ends, handles, solid), task.config.spline.degree)
+            fit = surface_fit(task, first)
+        return optimized(first, fit, schedule(task.config, _FACE_SHARES, _POINT_SHARES), task, checkpoints, STIFF.weights)
+
+
+BODY = WithStubs("body with stubs", "blocks", "mapping the body without its handles, and laying rods for these,")
+
+
+def _of_body(task: Task, vertices: Array, faces: Array, checkpoints: Checkpoints) -> SplineMap:
+    """Return the map of the body without its handles, at the place of the whole body at volume 1."""
+    surface = surface_from_arrays(vertices, faces, f"{task.surface.name} without handles")
+    config = replace(task.config, blocks=1, refinement=None).with_control_points(_CONTROL_POINTS)
+    own = replace(task, surface=surface, config=config, given_corners=None)
+    spline = GROWTH.make(own, checkpoints.of_part("body")).found.spline
+    return spline.with_control(surface.from_unit(spline.control.T).T)
+
+
+def _footprint(body: SplineMap, rim: Array) -> Footprint:
+    """Return the footprint on the body's cube for a rim (k, 3) that a handle leaves."""
+    samples = boundary_samples(body, _A_SPAN)
+    nearest = np.asarray(cKDTree(samples.points).query(rim)[1])
+    return footprint(samples.parameters[nearest], samples.faces[nearest], body.nets.spans[0][0])
+
+
+def _first(layout: BlockLayout, parts: tuple[BSplineVolume, ...], degree: int) -> SplineMap:
+    """Return the map of all blocks: rods whose ends lie on the body, and the parts of the body's map."""
+    count = len(layout.blocks) - len(parts)
+    rods = layout.blocks[:count]
+    knots = [tuple(open_uniform_knots(degree + spans, degree) for spans in block.spans) for block in layout.blocks]
+    nets = Nets(degree, tuple(knots), layout.interfaces)  # type: ignore[arg-type]
+    points = [_on_body(number, layout, knots[number], parts, degree) for number in range(len(rods))]
+    points += [part.control_points for part in parts]
+    return SplineMap(nets, nets.merged(nets.joined([np.moveaxis(net, -1, 0) for net in points])))
+
+
+def _on_body(
+    number: int, layout: BlockLayout, rows: tuple[Array, ...], parts: tuple[BSplineVolume, ...], degree: int
+) -> Array:
+    """Return the control points (n_u, n_v, n_w, 3) of a rod whose ends are the faces of the body's blocks below."""
+    places = [greville(row, degree) for row in rows]
+    points = layout.blocks[number].points(np.stack(np.meshgrid(*places, indexing="ij"), axis=-1))
+    for interface in layout.interfaces:
+        (own, face), (other, below) = interface.first, interface.second
+        if own == number:
+            body = parts[other - len(layout.blocks) + len(parts)].control_points
+            away = interface.turned(face_layer(body, below)) - face_layer(points, face)
+            share = np.maximum(0.0, 1.0 - 2.0 * (places[2] if face == "w0" else 1.0 - places[2]))
+            points = points + share[:, None] * away[:, :, None]
+    return points
