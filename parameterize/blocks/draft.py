@@ -11,6 +11,7 @@ from .inside import Body
 from .junctions import Junction, junction
 from .rings import ring
 from .rods import Rod, ends_turned, rod
+from .room import Room
 from .tips import tip
 
 _THINNER = 0.8  # a factor of sections and junctions that are folded or leave the body
@@ -36,7 +37,7 @@ class Draft:
     """
 
     def __init__(self, skeleton: Skeleton, body: Body) -> None:
-        self._skeleton, self._body = skeleton, body
+        self._skeleton, self._body, self._room = skeleton, body, Room(skeleton, body)
         self._size = {node: 1.0 for node, degree in enumerate(skeleton.degrees) if degree > 2}
         self._regular = dict.fromkeys(self._size, 0.0)
         self.junctions: dict[int, Junction] = {}
@@ -124,12 +125,12 @@ class Draft:
     def _lay(self, nodes: set[int]) -> None:
         """Place the junctions at some nodes by their factors, and lay the rods between their faces."""
         for node in sorted(nodes):
-            self.junctions[node] = junction(self._skeleton, node, self._body, self._size[node])
+            self.junctions[node] = junction(self._skeleton, node, self._room, self._size[node])
         for number, branch in enumerate(self._skeleton.branches):
             if number in self.rods and not nodes.intersection(branch.ends):
                 continue
             if branch.ends[0] == branch.ends[1] and branch.ends[0] not in self.junctions:
-                self.rods[number], self.quarters[number] = ring(branch.points, branch.radii, self._body)
+                self.rods[number], self.quarters[number] = ring(branch.points, branch.radii, self._room)
                 self.faces[number] = (None, None)
             else:
                 self._lay_rod(number, branch)
@@ -148,7 +149,7 @@ class Draft:
             last = last.swapaxes(0, 1)
             if first is not None:
                 last = ends_turned(first, last, at_lengths(branch.points, np.linspace(*span, 100)))
-        self.rods[number] = rod(branch.points, branch.radii, span, first, last, self._body)
+        self.rods[number] = rod(branch.points, branch.radii, span, first, last, self._room)
         self.faces[number] = (first, last)
 
     def _face(self, number: int, end: int) -> Array | None:

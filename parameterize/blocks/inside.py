@@ -40,6 +40,11 @@ class Body:
             found[met] = np.minimum(found, np.asarray(distances).ravel())[met]
         return found.reshape(shape[:-1])
 
+    def depths(self, points: Array) -> Array:
+        """Return the distances (n,) of points (n, 3) from the surface."""
+        squares = self._tree.squared_distance(self._vertices, self._faces, np.ascontiguousarray(points))[0]
+        return np.sqrt(np.asarray(squares).ravel())
+
     def contains(self, points: Array) -> Mask:
         """Return which points (..., 3) lie inside (...)."""
         rows = np.ascontiguousarray(points.reshape(-1, 3))

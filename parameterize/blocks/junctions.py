@@ -11,7 +11,7 @@ from ..spline.interface import axis_side
 from ..spline.volume import FACE_NAMES
 from .assignment import NORMALS
 from .frames import arc_lengths, rotated, tangents
-from .inside import Body
+from .room import Room
 from .splitting import End, junction_at, stub
 
 _THIN = 0.55  # of the way to the surface: half the width of a junction's block
@@ -70,16 +70,19 @@ class Exit:
     tangent: Array
 
 
-def junction(skeleton: Skeleton, node: int, body: Body, size: float) -> Junction:
+def junction(skeleton: Skeleton, node: int, room: Room, size: float) -> Junction:
     """Return the block at a node of three to six branches. size: a factor of its widths."""
     ends, found = junction_at(skeleton, node)
     center, radius = skeleton.nodes[node], float(skeleton.radii[node])
     free = np.setdiff1d(np.arange(len(NORMALS)), found.faces)
-    room = np.full(len(NORMALS), _FLAT * radius)
-    room[free] = np.minimum(room[free], body.rays(center, NORMALS[free] @ found.axes))
+    reach = np.full(len(NORMALS), _FLAT * radius)
+    ways = NORMALS[free] @ found.axes
+    reach[free] = np.minimum(
+        room.body.rays(center, ways), np.maximum(reach[free], room.rays(np.tile(center, (len(ways), 1)), ways))
+    )
     for (i, _), face in zip(ends, found.faces, strict=True):
-        room[face] = min(room[face], _SHARE / _THIN * skeleton.branches[i].length)
-    half = size * _THIN * room.reshape(3, 2).min(axis=1)
+        reach[face] = min(reach[face], _SHARE / _THIN * skeleton.branches[i].length)
+    half = size * _THIN * reach.reshape(3, 2).min(axis=1)
     exits = {
         end: _exit(stub(skeleton.branches[end[0]], end[1]), FACE_NAMES[face], center, float(half[face // 2]))
         for end, face in zip(ends, found.faces.tolist(), strict=True)

@@ -13,6 +13,7 @@ from ..spline.interface import Face, Interface, face_label, orientations, varyin
 from ..spline.multipatch import MultiPatch
 from ..spline.volume import FACE_NAMES
 from .block import Block
+from .centering import centered
 from .draft import Draft
 from .inside import Body
 from .merging import merge
@@ -119,7 +120,7 @@ def block_layout(
     if not skeleton.branches:
         raise LayoutError("the skeleton is a single point, without limbs or handles: one cube serves such a body")
     body = Body(vertices, faces)
-    draft = Draft(split(merge(skeleton, body), body), body)
+    draft = Draft(split(merge(centered(skeleton, body), body), body), body)
     for _ in range(_REPAIRS):
         faults = draft.repaired()
         if faults:

@@ -4,8 +4,8 @@ import numpy as np
 
 from ..arrays import Array
 from .frames import angle_about, arc_lengths, at_lengths, carried, turned, unit
-from .inside import Body
 from .rods import Rod, flattest, plain_offsets
+from .room import Room
 
 PARTS = 4  # blocks of a ring: none is glued to itself, and none turns by more than a quarter of a circle
 _STEP = 0.7  # of the median radius: the distance of sections
@@ -13,7 +13,7 @@ _FEWEST, _MOST = 3, 15  # pieces of a part
 _OVERLAP = 3  # sections beyond the beginning and the end, so that both are treated as all others
 
 
-def ring(points: Array, radii: Array, body: Body) -> tuple[Rod, int]:
+def ring(points: Array, radii: Array, room: Room) -> tuple[Rod, int]:
     """Return the sections around a closed curve (k, 3), whose last point is its first, and the quarter turns.
 
     The last section is the first one, turned by that many quarters: its corners are np.rot90 of the first's.
@@ -27,14 +27,14 @@ def ring(points: Array, radii: Array, body: Body) -> tuple[Rod, int]:
     along = unit(centers[2:] - centers[:-2])
     centers, numbers = centers[1:-1], numbers[1:-1]
     inner = slice(_OVERLAP, _OVERLAP + pieces + 1)
-    start = carried(flattest(centers[inner], along[inner], body), along[inner])
+    start = carried(flattest(centers[inner], along[inner], room), along[inner])
     turn = angle_about(along[inner][0], start[-1], start[0])
     quarters = int(np.round(turn / (0.5 * np.pi)))
     rest = turn - 0.5 * np.pi * quarters
     before = carried(start[0], along[: _OVERLAP + 1][::-1])[::-1]
     after = carried(start[-1], along[_OVERLAP + pieces :])
     across = turned(np.concatenate([before[:-1], start, after[1:]]), along, rest * numbers / pieces)
-    offsets = plain_offsets(centers, along, across, body)[inner]
+    offsets = plain_offsets(centers, along, across, room)[inner]
     offsets[-1] = np.rot90(offsets[0], quarters)
     centers = centers[inner]
     centers[-1] = centers[0]

@@ -6,7 +6,7 @@ import numpy as np
 
 from ..arrays import Array
 from .frames import angle_about, arc_lengths, at_lengths, carried, tangents, turned, unit
-from .inside import Body
+from .room import Room
 from .widths import THIN, half_widths
 
 _STEP = 0.7  # of the median radius: the distance of sections
@@ -60,7 +60,7 @@ def ends_turned(first: Array, last: Array, curve: Array) -> Array:
 
 
 def rod(
-    points: Array, radii: Array, span: tuple[float, float], first: Array | None, last: Array | None, body: Body
+    points: Array, radii: Array, span: tuple[float, float], first: Array | None, last: Array | None, room: Room
 ) -> Rod:
     """Return the sections across a curve (k, 3) between two arc lengths, which may lie beyond its ends.
 
@@ -77,11 +77,11 @@ def rod(
     if first is None and last is not None:
         across = carried(_side(last), along[::-1])[::-1]
     else:
-        across = carried(flattest(centers, along, body) if first is None else _side(first), along)
+        across = carried(flattest(centers, along, room) if first is None else _side(first), along)
     if first is not None and last is not None:
         turn = angle_about(along[-1], across[-1], _side(last))
         across = turned(across, along, np.linspace(0.0, turn, count))
-    offsets = plain_offsets(centers, along, across, body)
+    offsets = plain_offsets(centers, along, across, room)
     for face, place in ((first, 0), (last, -1)):
         if face is not None:
             away = np.abs(lengths - lengths[place])
@@ -105,17 +105,17 @@ def _reach(face: Array) -> float:
     return _BLEND * float(np.linalg.norm(face - face.mean(axis=(0, 1)), axis=-1).max())
 
 
-def plain_offsets(centers: Array, along: Array, across: Array, body: Body) -> Array:
+def plain_offsets(centers: Array, along: Array, across: Array, room: Room) -> Array:
     """Return the offsets (m, 2, 2, 3) of the corners of sections as wide as the body allows."""
     beside = np.cross(along, across)
     steps = np.maximum(np.gradient(arc_lengths(centers)), 1e-300)
     curvature = np.gradient(along, axis=0) / steps[:, None]
-    half = half_widths(centers, across, beside, curvature, body)
+    half = half_widths(centers, across, beside, curvature, room)
     axes = np.stack([across, beside], axis=1)
     return np.einsum("uvd,kd,kda->kuva", _SIGNS, half, axes)
 
 
-def flattest(centers: Array, along: Array, body: Body) -> Array:
+def flattest(centers: Array, along: Array, room: Room) -> Array:
     """Return the vector (3,) across the first tangent whose carried copies are farthest from the surface.
 
     Along it the sections of a flat body are wide.
@@ -124,7 +124,7 @@ def flattest(centers: Array, along: Array, body: Body) -> Array:
     frame = carried(start, along)
     angles = np.linspace(0.0, np.pi, 12, endpoint=False)
     ways = np.stack([turned(frame, along, np.full(len(along), angle)) for angle in angles])
-    widths = np.minimum(body.rays(centers, ways), body.rays(centers, -ways))
+    widths = np.minimum(room.body.rays(centers, ways), room.body.rays(centers, -ways))
     return np.asarray(ways[int(np.argmax(np.median(widths, axis=1).round(9))), 0])
 
 
