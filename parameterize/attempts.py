@@ -8,6 +8,7 @@ import logging
 from .blocks.layout import LayoutError
 from .checkpoint import Checkpoints
 from .starts.blocks import BLOCKS
+from .starts.body import BODY
 from .starts.extension import EXTENSION
 from .starts.growth import GROWTH, LAST, STIFF
 from .starts.network import NETWORK
@@ -30,6 +31,8 @@ def starts_of(task: Task) -> tuple[Start, ...]:
         )
     if task.choice.division == "cube":
         return STARTS
+    if task.choice.division == "body":
+        return (BODY, BLOCKS)
     return (BLOCKS,) if task.surface.genus or task.config.blocks is not None else (BLOCKS, *STARTS)
 
 

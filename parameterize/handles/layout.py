@@ -7,9 +7,9 @@ import numpy as np
 from ..arrays import Array, IntArray
 from ..blocks.block import Block
 from ..blocks.frames import arc_lengths, at_lengths
-from ..blocks.inside import Body
-from ..blocks.layout import BlockLayout
+from ..blocks.layout import BlockLayout, LayoutError
 from ..blocks.rods import ends_turned, rod
+from ..blocks.room import Room
 from ..spline.bspline import breakpoints
 from ..spline.interface import axis_side
 from ..spline.volume import FACE_NAMES, BSplineVolume
@@ -19,7 +19,6 @@ ACROSS = 3  # spans of the body's map that a stub covers in both directions
 _ALONG = 4, 24  # the fewest and the most spans along a stub
 _STRETCH = 2.0  # how long a span along a stub is, over one across it
 _PLACES = 100  # points of a stub's curve
-
 
 
 @dataclass(frozen=True)
@@ -53,23 +52,27 @@ def footprint(parameters: Array, faces: IntArray, spans: int) -> Footprint:
 
 
 def stub_layout(
-    volume: BSplineVolume, ends: list[tuple[Footprint, Footprint]], handles: tuple[Handle, ...], body: Body
+    volume: BSplineVolume, ends: list[tuple[Footprint, Footprint]], handles: tuple[Handle, ...], room: Room
 ) -> tuple[BlockLayout, tuple[BSplineVolume, ...]]:
     """Return the layout of the handles' rods, then the body's blocks; and the map of each of these.
 
     volume: the map of the body, with uniform knots. ends: the footprints of each handle at its first and last end.
+    Raises LayoutError where two of them are the same.
     """
-    spans = len(breakpoints(volume.knots[0])) - 1
+    ends_of_spans = breakpoints(volume.knots[0])
+    spans = len(ends_of_spans) - 1
     starts = [_apart([one.first[one.axes.index(axis)] for pair in ends for one in pair if axis in one.axes], spans)
               for axis in range(3)]  # fmt: skip
     cuts = [sorted({0, spans, *row, *(first + ACROSS for first in row)}) for row in starts]
-    parts = volume.divided(*(np.array(row[1:-1]) / spans for row in cuts))  # type: ignore[arg-type]
+    parts = volume.divided(*(ends_of_spans[row[1:-1]] for row in cuts))  # type: ignore[arg-type]
     cells = np.ndindex(*(len(row) - 1 for row in cuts))
     pieces = {cell: _piece(cell, part) for cell, part in zip(cells, parts, strict=True)}
+    faces = [_face(one, starts, cuts, pieces) for pair in ends for one in pair]
+    if len({face.tobytes() for face in faces}) < len(faces):
+        raise LayoutError("handles leave the body at nearly the same place: no stubs fit beside each other there")
     rods = []
-    for number, (handle, pair) in enumerate(zip(handles, ends, strict=True)):
-        first, last = (_face(one, starts, cuts, pieces) for one in pair)
-        rods.append(_rod(f"handle {number}", handle, first, last.swapaxes(0, 1), body))
+    for number, (handle, first, last) in enumerate(zip(handles, faces[::2], faces[1::2], strict=True)):
+        rods.append(_rod(f"handle {number}", handle, first, last.swapaxes(0, 1), room))
     return BlockLayout.from_blocks([*rods, *pieces.values()]), parts
 
 
@@ -77,7 +80,7 @@ def _apart(firsts: list[int], spans: int) -> list[int]:
     """Return where intervals begin that do not overlap: of those that do, one takes the place of all."""
     groups: list[list[int]] = []
     for first in sorted(firsts):
-        if groups and first <= groups[-1][-1] + ACROSS:
+        if groups and first < float(np.mean(groups[-1])) + ACROSS:
             groups[-1].append(first)
         else:
             groups.append([first])
@@ -104,13 +107,13 @@ def _face(
     return face if bool(side) != (axis == 1) else face.swapaxes(0, 1)
 
 
-def _rod(name: str, handle: Handle, first: Array, last: Array, body: Body) -> Block:
+def _rod(name: str, handle: Handle, first: Array, last: Array, room: Room) -> Block:
     """Return the rod along the curve of a handle between two faces (2, 2, 3), both right-handed with it."""
     bends = np.concatenate([first.mean(axis=(0, 1))[None], handle.curve, last.mean(axis=(0, 1))[None]])
     length = float(arc_lengths(bends)[-1])
     curve = at_lengths(bends, np.linspace(0.0, length, _PLACES))
     last = ends_turned(first, last, curve)
-    laid = rod(curve, np.full(_PLACES, handle.radius), (0.0, length), first, last, body)
+    laid = rod(curve, np.full(_PLACES, handle.radius), (0.0, length), first, last, room)
     sections = laid.sections(np.ones(len(laid.centers)))
     sections[0], sections[-1] = first, last
     along = int(np.clip(round(ACROSS * length / (2.0 * _STRETCH * handle.radius)), *_ALONG))

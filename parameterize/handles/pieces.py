@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ..arrays import Array, IntArray
+from ..arrays import Array, IntArray, Mask
 from ..skeleton.graph import Branch, Skeleton
 
 _TUBE = 2.5  # times the area of the ball's disc: a section of a tube; that of a square rod has 1.27
@@ -73,7 +73,7 @@ def _piece(branch: Branch, volumes: Array) -> Handle | None:
     return Handle(branch.points[first : last + 1], radius)
 
 
-def _runs(mask: Array) -> IntArray:
+def _runs(mask: Mask) -> IntArray:
     """Return the first and the last place of each run of true values: (r, 2)."""
     edges = np.diff(np.concatenate([[False], mask, [False]]).astype(np.int64))
     return np.stack([np.flatnonzero(edges == 1), np.flatnonzero(edges == -1) - 1], axis=1)

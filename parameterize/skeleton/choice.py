@@ -12,11 +12,8 @@ Division = Literal["blocks", "body", "cube"]
 # Share of the volume in the balls around the curves. A square rod has .79, and a rod twice as wide as thick .39:
 TUBE_OF_LIMBS = 0.7  # without handles one cube is possible, and is left for a body that is nearly all limbs: bodies
 # of round limbs have .75 to .97, and one with a fat trunk that the curves do not fill (a bunny) .65 and less
-TUBE_OF_HANDLES = 0.4  # sections up to twice as wide as thick are pulled out of square rods
-SHELL = 0.1  # a wall that is bent around a void has less, and has no curve in its middle
+TUBE_OF_HANDLES = 0.4  # with it blocks along all branches serve: square rods become sections twice as wide as thick
 LONG = 10.0  # median radii of the longest limb, to the middle of its junction: five diameters
-RING = 0.2  # reach over the length of all curves: rings of blocks nearly as wide as they are long around have .17, a
-# plate with one hole .15, a cup with a handle .28
 
 
 @dataclass(frozen=True)
@@ -36,9 +33,12 @@ class Choice:
     reason: str
 
 
-def choose(skeleton: Skeleton) -> Choice:
-    """Return how the body of a skeleton is divided."""
-    return _with_handles(skeleton) if skeleton.handles else _without_handles(skeleton)
+def choose(skeleton: Skeleton, *, stubs: bool) -> Choice:
+    """Return how the body of a skeleton is divided.
+
+    stubs: whether all its handles are tubes that leave a body and come back to it.
+    """
+    return _with_handles(skeleton, stubs) if skeleton.handles else _without_handles(skeleton)
 
 
 def _without_handles(skeleton: Skeleton) -> Choice:
@@ -54,18 +54,17 @@ def _without_handles(skeleton: Skeleton) -> Choice:
     return Choice("blocks", f"{np.sum(np.equal(skeleton.degrees, 1))} limbs: {figures}: blocks along them")
 
 
-def _with_handles(skeleton: Skeleton) -> Choice:
-    """Return blocks for bodies that are branches all through, else one block with the loops on its faces."""
-    length = sum(branch.length for branch in skeleton.branches)
-    share = skeleton.reach / length
+def _with_handles(skeleton: Skeleton, stubs: bool) -> Choice:
+    """Return blocks along all branches, or one block with the handles on its faces."""
     handles = "1 handle" if skeleton.handles == 1 else f"{skeleton.handles} handles"
-    figures = f"{skeleton.tube:.2f} of the volume around its curves, reach {share:.2f} of their length"
+    figures = f"{skeleton.tube:.2f} of the volume around its curves"
     if skeleton.tube >= TUBE_OF_HANDLES:
         return Choice("blocks", f"{handles}, thick branches: {figures}: blocks along them")
-    if share <= RING:
-        return Choice("blocks", f"{handles}, flat branches: {figures}: blocks as wide as the body along them")
-    kind = "a shell" if skeleton.tube < SHELL else "a fat body"
-    return Choice("body", f"{handles} on {kind}: {figures}: one block, with the loops on its faces")
+    if stubs:
+        return Choice(
+            "body", f"{handles}, thin ones on a fat body: {figures}: one block, with the handles on its faces"
+        )
+    return Choice("blocks", f"{handles}, flat branches: {figures}: blocks as wide as the body along them")
 
 
 def _is_limb(branch: Branch, skeleton: Skeleton) -> bool:

@@ -56,9 +56,6 @@ class Skeleton:
         body of tubes, small for a sheet or a shell.
     cell : float
         The edge of the cells of the lattice from which the skeleton was made.
-    reach : float
-        The distance from the curves within which 95 % of the volume lie: the radius of a tube, more for flat branches
-        and fat bodies.
     """
 
     nodes: Array
@@ -66,7 +63,6 @@ class Skeleton:
     branches: tuple[Branch, ...]
     tube: float
     cell: float
-    reach: float = 0.0
 
     @property
     def handles(self) -> int:

@@ -25,7 +25,6 @@ KNOTTED = (
     "a knotted tunnel: the body is no graph of thick branches, so it cannot be cut into blocks along its skeleton; "
     "fill the tunnel or cut the model into pieces"
 )
-REACHED = 0.95  # share of the volume within the reach: the last points in corners say little of a body's width
 _MOST_PAIRS = 2_000_000  # of points and balls compared at once: 50 MB
 
 
@@ -127,8 +126,7 @@ def _measured(web: Web, lattice: Lattice, vertices: Array, faces: IntArray) -> S
     samples = lattice.places(index[:: len(index) // SAMPLES + 1])
     centers = np.concatenate([nodes, *curves])
     tube = _share_in_balls(samples, centers, np.concatenate([at_nodes, *(branch.radii for branch in branches)]))
-    reach = float(np.quantile(np.asarray(cKDTree(centers).query(samples)[0]), REACHED))
-    return Skeleton(nodes, at_nodes, branches, tube, lattice.cell, reach)
+    return Skeleton(nodes, at_nodes, branches, tube, lattice.cell)
 
 
 def _share_in_balls(samples: Array, centers: Array, radii: Array) -> float:

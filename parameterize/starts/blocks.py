@@ -6,7 +6,7 @@ out on them: its points take the nearest places on the blocks anew before each r
 """
 
 import logging
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -25,7 +25,7 @@ from ..spline.nets import Nets
 from ..spline.spline_map import SplineMap
 from ..surface.geometry import vertex_quadrics, vertex_weights
 from ..threads import one_blas_thread
-from .growth import STEPS, Grow
+from .growth import STEPS, STIFF, Grow
 from .on_cube import MORE_ROUNDS
 from .start import MOST_POINTS, Attempt, Start, Task, optimized
 
@@ -35,6 +35,7 @@ _USUAL_STEPS = (20, 8, 8, 8)  # of Newton's method in the later rounds of most r
 _FACE_SHARES = (1e-3, 1e-2, 0.1)  # of the weight of the surface's data while the faces are drawn to it, round by round
 _POINT_SHARES = (0.01, 0.1)  # the same while the surface's points draw F, before they have all their weight
 _LONGEST = 0.055  # length at volume 1 above which the mesh's edges are cut: about a span across a block
+_SOFT_ROUNDS = 4  # with the usual weights, after a stiff map is certified
 _FAR = 0.2  # root mean square distance from the surface beyond which a folded map is given up
 
 
@@ -64,10 +65,23 @@ class AlongSkeleton(Start):
                 _log.warning("%s", error)
                 return None
             fit = surface_fit(task, first)
-        return optimized(first, fit, schedule(task.config), task, checkpoints)
+        return softened(
+            optimized(first, fit, schedule(task.config), task, checkpoints, STIFF.weights), task, checkpoints
+        )
 
 
 BLOCKS = AlongSkeleton("blocks", "blocks", "laying blocks along the skeleton")
+
+
+def softened(stiff: Attempt, task: Task, checkpoints: Checkpoints) -> Attempt:
+    """Return what rounds with the usual weights make of a stiff map, or that map where they make it worse."""
+    if any(stiff.found.faults):
+        return stiff
+    spline = stiff.found.spline
+    rounds = Schedule((Polish(),), _SOFT_ROUNDS, _USUAL_STEPS)
+    soft = optimized(spline, stiff.fit.on_nets(spline.nets), rounds, task, checkpoints.of_part("soft"))
+    soft = replace(soft, course=soft.course.after(stiff.course))
+    return min(soft, stiff, key=lambda attempt: attempt.rank)
 
 
 def schedule(

@@ -10,13 +10,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ..arrays import Array
+from ..arrays import Array, IntArray
 from ..blocks.inside import Body
-from ..blocks.layout import BlockLayout
+from ..blocks.layout import BlockLayout, LayoutError
+from ..blocks.room import Room
 from ..checkpoint import Checkpoints
 from ..handles.cutting import without_handles
 from ..handles.layout import Footprint, footprint, stub_layout
-from ..handles.pieces import handles_of
 from ..optimization.reassignment import boundary_samples
 from ..progress import timed
 from ..spline.bspline import greville, open_uniform_knots
@@ -26,14 +26,12 @@ from ..spline.spline_map import SplineMap
 from ..spline.volume import BSplineVolume
 from ..surface.surface import surface_from_arrays
 from ..threads import one_blas_thread
-from ..training.samples import interior_points
-from .blocks import schedule, surface_fit
+from .blocks import schedule, softened, surface_fit
 from .growth import GROWTH, STIFF
 from .start import MOST_POINTS, Attempt, Start, Task, optimized
 
 _log = logging.getLogger(__name__)
 
-_CELL = 0.03  # of the lattice whose points tell the areas of sections, at volume 1
 _CONTROL_POINTS = 18  # a direction of the body's first map: it is optimised again with its handles
 _FACE_SHARES = (0.1,)  # as those of blocks along the skeleton: the body is there, only its handles have some way to go
 _POINT_SHARES = (0.1,)
@@ -47,31 +45,33 @@ class WithStubs(Start):
     def make(self, task: Task, checkpoints: Checkpoints) -> Attempt | None:
         """Map the body without its handles, lay rods for these, and return the attempt with all blocks.
 
-        None is returned where the body has no such handles.
+        None is returned where they do not leave one body without handles, or no rods fit.
         """
         surface = task.surface
         with timed(task.seconds, "fit"), one_blas_thread():
-            inside = interior_points(surface.unit_vertices, surface.faces, _CELL)
-            handles = handles_of(task.skeleton, inside)
-            found = handles and without_handles(
-                surface.unit_vertices, surface.faces, task.skeleton, handles, task.own + MOST_POINTS
-            )
+            handles, most = task.handles, task.own + MOST_POINTS
+            found = handles and without_handles(surface.unit_vertices, surface.faces, task.skeleton, handles, most)
         if not found:
             return None
         vertices, faces, rims = found
         body = _of_body(task, vertices, faces, checkpoints)
         with timed(task.seconds, "fit"), one_blas_thread():
             ends = [(_footprint(body, first), _footprint(body, last)) for first, last in rims]
-            solid = Body(surface.unit_vertices, surface.faces)
-            first = _first(*stub_layout(body.volume, ends, handles, solid), task.config.spline.degree)
+            room = Room(task.skeleton, Body(surface.unit_vertices, surface.faces))
+            try:
+                first = _first(*stub_layout(body.volume, ends, handles, room), task.config.spline.degree)
+            except LayoutError as error:
+                _log.warning("%s", error)
+                return None
             fit = surface_fit(task, first)
-        return optimized(first, fit, schedule(task.config, _FACE_SHARES, _POINT_SHARES), task, checkpoints, STIFF.weights)
+        rounds = schedule(task.config, _FACE_SHARES, _POINT_SHARES)
+        return softened(optimized(first, fit, rounds, task, checkpoints, STIFF.weights), task, checkpoints)
 
 
 BODY = WithStubs("body with stubs", "blocks", "mapping the body without its handles, and laying rods for these,")
 
 
-def _of_body(task: Task, vertices: Array, faces: Array, checkpoints: Checkpoints) -> SplineMap:
+def _of_body(task: Task, vertices: Array, faces: IntArray, checkpoints: Checkpoints) -> SplineMap:
     """Return the map of the body without its handles, at the place of the whole body at volume 1."""
     surface = surface_from_arrays(vertices, faces, f"{task.surface.name} without handles")
     config = replace(task.config, blocks=1, refinement=None).with_control_points(_CONTROL_POINTS)

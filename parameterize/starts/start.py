@@ -15,6 +15,7 @@ from ..config import Config, SplineConfig
 from ..cube.cutting import subdivide_finely
 from ..cube.layout import CubeLayout
 from ..cube.sphere import lay_on_sphere
+from ..handles.pieces import Handle, handles_of
 from ..optimization.endings import Course
 from ..optimization.optimized import Optimized
 from ..optimization.phases import Schedule
@@ -30,12 +31,14 @@ from ..spline.spline_map import SplineMap
 from ..surface.geometry import normals_and_areas, vertex_quadrics, vertex_weights
 from ..surface.surface import Surface
 from ..threads import one_blas_thread
+from ..training.samples import interior_points
 
 _log = logging.getLogger(__name__)
 
 FEWEST_SPANS = 4  # across a block: with fewer its section cannot become round
 COMPACT = 4.0  # cubed area of the surface over 36 pi, at volume 1: bodies with less have no long limbs, and most have
 # less, so that these need not wait for a skeleton
+_CELL = 0.03  # of the lattice whose points tell the areas of sections, at volume 1
 Origin = Literal["network", "growth", "extension", "blocks"]
 MOST_POINTS = (
     30_000  # added where long edges of the mesh are cut, else they are cut less finely: memory grows with them
@@ -101,16 +104,23 @@ class Task:
         return found
 
     def _by_skeleton(self) -> Choice:
-        """Return the choice by the body's skeleton, as far as there is a start for it."""
+        """Return the choice by the body's skeleton. Raises SkeletonError for a body with handles that has none."""
         try:
-            found = choose(self.skeleton)
+            return choose(self.skeleton, stubs=bool(self.surface.genus and self.handles))
         except SkeletonError as error:
             if self.surface.genus:
                 raise
             return Choice("cube", f"no handles, and no skeleton ({error}): one cube")
-        if found.division == "body":
-            return Choice("blocks", f"{found.reason}, for which there is no start: blocks along the skeleton")
-        return found
+
+    @cached_property
+    def handles(self) -> tuple[Handle, ...]:
+        """Return the thin handles of a fat body, as many as it has in all; () where they are thick, or there are none.
+
+        Raises SkeletonError for a body without a skeleton.
+        """
+        surface = self.surface
+        inside = interior_points(surface.unit_vertices, surface.faces, _CELL)
+        return handles_of(self.skeleton, inside)
 
     @cached_property
     def layout(self) -> BlockLayout:

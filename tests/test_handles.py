@@ -1,0 +1,83 @@
+"""Thin handles on a fat body: found, cut off, and laid on its faces again."""
+
+import numpy as np
+import pytest
+from thick_bodies import implicit, plate, ring
+
+from parameterize.blocks.inside import Body
+from parameterize.blocks.room import Room
+from parameterize.certificate.boundary import check_boundary
+from parameterize.handles.cutting import without_handles
+from parameterize.handles.layout import ACROSS, footprint, stub_layout
+from parameterize.handles.pieces import handles_of
+from parameterize.skeleton.solid import skeleton_of
+from parameterize.spline.multipatch import MultiPatch
+from parameterize.spline.volume import BSplineVolume
+from parameterize.surface.geometry import signed_volume
+from parameterize.surface.topology import genus_of
+from parameterize.training.samples import interior_points
+
+BALL = 0.9  # of the bodies below
+THIN = 0.13
+
+
+def eared(x):
+    """A ball with a thin handle, or ear, on either side."""
+    ears = (ring(np.array([x[0] - side, x[1], x[2]]), 0.0, 0.4, THIN) for side in (-1.0, 1.0))
+    return np.minimum(np.linalg.norm(x, axis=0) - BALL, np.minimum(*ears))
+
+
+@pytest.fixture(scope="module")
+def body():
+    vertices, faces, genus = implicit(eared, (1.7, 1.1, 1.1), 64)
+    skeleton = skeleton_of(vertices, faces, genus)
+    return vertices, faces, skeleton, handles_of(skeleton, interior_points(vertices, faces, 0.03))
+
+
+def test_each_ear_is_a_handle(body):
+    *_, handles = body
+    assert len(handles) == 2
+    for handle in handles:
+        ear = handle.curve.mean(axis=0)
+        assert np.linalg.norm(handle.curve - [np.sign(ear[0]) * 0.55, 0.0, 0.0], axis=1).std() < 0.1
+        assert 0.05 < handle.radius < 0.12  # of the tube, with the whole body at volume 1
+
+
+def test_holes_of_a_plate_and_a_ring_alone_are_no_handles_of_a_body():
+    vertices, faces, genus = plate([(-1.5, 0.0), (1.5, 0.0)])
+    assert handles_of(skeleton_of(vertices, faces, genus), interior_points(vertices, faces, 0.03)) == ()
+
+
+def test_the_body_without_its_handles_has_none(body):
+    vertices, faces, skeleton, handles = body
+    points, triangles, rims = without_handles(vertices, faces, skeleton, handles, 40_000)
+    assert genus_of(triangles) == 0 and len(rims) == 2
+    ball = 4.0 / 3.0 * np.pi * (BALL * np.ptp(vertices[:, 1]) / (2.0 * BALL)) ** 3
+    assert ball < signed_volume(points, triangles) < 1.1 * ball  # stumps of the ears are left
+    for (first, last), handle in zip(rims, handles, strict=True):
+        for rim, end in ((first, handle.curve[0]), (last, handle.curve[-1])):
+            assert np.linalg.norm(rim - end, axis=1).max() < 3.0 * handle.radius
+
+
+def test_stubs_are_glued_to_whole_faces_and_the_body_stays_as_it_is(body):
+    vertices, faces, skeleton, handles = body
+    side = 0.5
+    volume = BSplineVolume.from_function(
+        lambda u, v, w: (side * (2 * u - 1), side * (2 * v - 1), side * (2 * w - 1) + 0.01 * u * v), control_points=13
+    )
+    spans = 10
+    assert footprint(np.array([[1.0, 0.02, 0.5], [1.0, 0.1, 0.5]]), np.array([1, 1]), spans).first == (1, 4)
+    ends = []
+    for handle in handles:
+        right = handle.curve[:, 0].mean() > 0.0
+        places = [np.array([[float(right), 0.5 + x[1], 0.5]]) for x in (handle.curve[0], handle.curve[-1])]
+        ends.append(tuple(footprint(place, np.array([int(right)]), spans) for place in places))
+    layout, parts = stub_layout(volume, ends, handles, Room(skeleton, Body(vertices, faces)))
+    rods = layout.blocks[: len(layout.blocks) - len(parts)]
+    assert len(rods) == 2 and all(rod.spans[:2] == (ACROSS, ACROSS) for rod in rods)
+    glued = [face for one in layout.interfaces for face in (one.first, one.second)]
+    assert all((k, end) in glued for k in range(2) for end in ("w0", "w1"))
+    corner = volume([[0.0, 0.0, 0.0]])[0]
+    assert np.array_equal(parts[0]([[0.0, 0.0, 0.0]])[0], corner)
+    solid = MultiPatch(tuple(block.spline for block in layout.blocks), layout.interfaces)
+    assert check_boundary(solid).injective is not False
