@@ -1,6 +1,6 @@
 """The starts, one after the other, until a map has no faults: the network, a cube that grows, an extended layout.
 
-A body with handles, and one with limbs, starts from blocks along its skeleton.
+A body with handles, and one with limbs, starts from blocks along its skeleton, one that planes bound from exact blocks.
 """
 
 import logging
@@ -11,6 +11,7 @@ from .starts.blocks import BLOCKS
 from .starts.extension import EXTENSION
 from .starts.growth import GROWTH, LAST, STIFF
 from .starts.network import NETWORK
+from .starts.planes import PLANES
 from .starts.start import Start, Task
 from .starts.tried import Tried
 
@@ -28,6 +29,8 @@ def starts_of(task: Task) -> tuple[Start, ...]:
         raise LayoutError(
             f"genus {task.surface.genus}: one cube is never mapped one-to-one onto a body with handles; allow more"
         )
+    if task.choice.division == "planes":
+        return (PLANES,)
     if task.choice.division == "cube":
         return STARTS
     return (BLOCKS,) if task.surface.genus or task.config.blocks is not None else (BLOCKS, *STARTS)
