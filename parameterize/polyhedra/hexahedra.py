@@ -72,7 +72,7 @@ def _turned(points: Array, corners: IntArray) -> IntArray:
 def cubes(points: Array, cells: Sequence[ConvexCell]) -> Hexahedra | None:
     """Return cells that have the faces of cubes as hexahedra; None where one has not."""
     found = [_cube(cell) for cell in cells]
-    return None if any(one is None for one in found) else Hexahedra(points, np.array(found)).turned()
+    return None if any(one is None for one in found) else Hexahedra(points, np.array(found))
 
 
 def _cube(cell: ConvexCell) -> IntArray | None:
@@ -135,4 +135,4 @@ def subdivided(points: Array, cells: Sequence[ConvexCell]) -> Hexahedra | None:
             bottom = (corner, middle((corner, second)), middle(face), middle((corner, first)))
             tops = (middle((corner, third)), middle(other), middle(cell.corners), middle(last))
             found.append(column(bottom, dict(zip(bottom, tops, strict=True))))
-    return Hexahedra(np.array(rows), np.array(found)).turned()
+    return Hexahedra(np.array(rows), np.array(found))

@@ -36,7 +36,7 @@ def exact_layout(vertices: Array, faces: IntArray, spans: int, most: int | None 
     if body is None:
         return None
     limit = MOST_BLOCKS if most is None else min(most, MOST_BLOCKS)
-    found = [one for one in _divisions(body) if len(one) <= limit and one.quality >= LEAST_QUALITY]
+    found = [one for one in _divisions(body, limit) if one.quality >= LEAST_QUALITY]
     for one in sorted(found, key=lambda one: one.cost):
         layout = _layout(one, spans)
         if _fills(layout, body) and _is_proved(layout):
@@ -44,21 +44,25 @@ def exact_layout(vertices: Array, faces: IntArray, spans: int, most: int | None 
     return None
 
 
-def _divisions(body: Polyhedron) -> Iterator[Hexahedra]:
-    """Yield the divisions of a body into hexahedra: by columns, by its planes, and of the cells of these."""
-    yield from columns(body)
+def _divisions(body: Polyhedron, most: int) -> Iterator[Hexahedra]:
+    """Yield the divisions of a body into `most` hexahedra or fewer: columns, cells between its planes, parts of them.
+
+    Cells that have the faces of cubes are not divided any more.
+    """
+    yield from (found for found in columns(body) if len(found) <= most)
     cells = arrangement_of(body)
     merged = None if cells is None else merged_cells(cells)
-    if cells is None or merged is None:
+    if cells is None or merged is None or len(merged) > most:
         return
-    for way in (cubes, subdivided):
-        if (found := way(cells.points, merged)) is not None:
-            yield found
+    if (whole := cubes(cells.points, merged)) is not None:
+        yield whole
+    elif sum(len(cell.corners) for cell in merged) <= most and (parts := subdivided(cells.points, merged)) is not None:
+        yield parts
 
 
 def _layout(found: Hexahedra, spans: int) -> BlockLayout:
     """Return hexahedra as blocks, with spans along their edges that are about equally long."""
-    rows = found.points[found.corners]  # (k, 2, 2, 2, 3)
+    rows = found.points[found.turned().corners]  # (k, 2, 2, 2, 3)
     plain = BlockLayout.from_blocks([_block(k, one, (1, 1, 1)) for k, one in enumerate(rows)])
     knots = (open_uniform_knots(2, 1),) * 3
     classes = np.concatenate(tied_spans(Nets(1, (knots,) * len(plain), plain.interfaces)))

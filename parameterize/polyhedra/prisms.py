@@ -81,4 +81,4 @@ def _over(found: Quadrangles, flat: Array, low: Array, high: Array) -> Hexahedra
         ends += [face[list(own)].mean(axis=0) if own else inside[k] for k, own in enumerate(found.parents)]
     count = len(found.points)
     mates = {k: count + k for k in range(count)}
-    return Hexahedra(np.array(ends), np.array([column(one, mates) for one in found.corners], dtype=np.int64)).turned()
+    return Hexahedra(np.array(ends), np.array([column(one, mates) for one in found.corners], dtype=np.int64))

@@ -16,7 +16,7 @@ from ..arrays import Array
 from ..surface.triangulation import triangulate
 
 LEAST = 0.25  # the sine of the sharpest and of the bluntest angle of a quadrangle that is taken, about 15 degrees
-_MOST_TRIED = 200  # sets of points on edges
+_MOST_TRIED = 40  # sets of points on edges
 _MOST_ADDED = 2  # points on edges
 
 Loop = tuple[int, ...]
