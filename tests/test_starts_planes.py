@@ -71,4 +71,4 @@ def test_a_run_has_no_training_to_draw(in_folder, few_distances):
     report = iga_nn.run("poisson", "cube", "out", mapping=mapping, poisson=poisson).report
     assert report["parameterization"]["division"] == "bounded by planes: 1 exact block"
     assert "history.png" not in report.get("not_drawn", {}) and not (in_folder / "out" / "history.png").exists()
-    assert max(report["estimate"]["seconds"]) < 120.0
+    assert len(set(report["estimate"]["seconds"])) == 1  # no training, and no rounds, that may be easy or hard
