@@ -1,6 +1,6 @@
 """The starts, one after the other, until a map has no faults: the network, a cube that grows, an extended layout.
 
-A body with handles, and one with limbs, starts from blocks along its skeleton.
+A body with handles, and one with limbs, starts from blocks along its skeleton, one that planes bound from exact blocks.
 """
 
 import logging
@@ -12,6 +12,7 @@ from .starts.body import BODY
 from .starts.extension import EXTENSION
 from .starts.growth import GROWTH, LAST, STIFF
 from .starts.network import NETWORK
+from .starts.planes import PLANES
 from .starts.start import Start, Task
 from .starts.tried import Tried
 
@@ -29,6 +30,8 @@ def starts_of(task: Task) -> tuple[Start, ...]:
         raise LayoutError(
             f"genus {task.surface.genus}: one cube is never mapped one-to-one onto a body with handles; allow more"
         )
+    if task.choice.division == "planes":
+        return (PLANES,)
     if task.choice.division == "cube":
         return STARTS
     if task.choice.division == "body":

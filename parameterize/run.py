@@ -52,17 +52,17 @@ class Parameterization(Brief):
     quality : QualityReport
         What is measured; printed, a table.
     history : dict of str to array
-        Columns of equal length, one row a training step.
+        Columns of equal length, one row a training step; empty for exact blocks.
     seconds : dict of str to float
         Wall seconds of train, fit, optimize and certify, the last with quality, at the end: the certificates on the way
-        count as optimize; with config.refinement, also those of refine.
+        count as optimize; with config.refinement, also those of refine. A map that is not trained has no train.
     device : str
         Where the network was trained.
     seed : int
     config : Config
-    origin : "network", "growth", "extension" or "blocks"
-        Where the map comes from: the trained network, a cube that grew, an extended layout of the surface, or blocks
-        along the skeleton.
+    origin : "network", "growth", "extension", "blocks" or "planes"
+        Where the map comes from: the trained network, a cube that grew, an extended layout of the surface, blocks along
+        the skeleton, or exact blocks along the planes of the surface.
     attempts : tuple of AttemptReport
         The starts that were tried, in their order, with rounds and seconds by phase and the faults of their maps.
     refinement : Refinement or None
@@ -77,7 +77,7 @@ class Parameterization(Brief):
     >>> config = iga_nn.preset("fast").scaled(0.02).with_control_points(6)  # a quick look
     >>> result = iga_nn.parameterize(iga_nn.sample("cube"), config)
     >>> result.quality.certificate is result.certificate, sorted(result.seconds)
-    (True, ['certify', 'fit', 'optimize', 'train'])
+    (True, ['certify', 'fit', 'optimize'])
     """
 
     volume: BSplineVolume | MultiPatch

@@ -104,7 +104,7 @@ print(json.dumps([*said.seconds, said.memory_mb, usage.ru_utime + usage.ru_stime
 
 def test_it_is_said_before_the_training_and_kept_in_the_report(formula_training, in_folder, capsys):
     formula_training()
-    assert main(["parameterize", "cube", "--out", "out"]) == 0
+    assert main(["parameterize", "bean", "--out", "out"]) == 0
     (line,) = [text for text in capsys.readouterr().err.splitlines() if text.startswith("estimate:")]
     assert re.fullmatch(r"estimate: about \d+( to \d+)? (minutes|seconds), \d\.\d GB of memory", line)
     found = report.read(in_folder / "out")["estimate"]

@@ -41,6 +41,7 @@ ORIGINS = {
     "growth": ("a growing cube", "the surface laid on its faces without the network"),
     "extension": ("the surface's layout on a cube", "extended into the solid without the network"),
     "blocks": ("blocks along the skeleton", "glued by whole faces, and drawn to the surface"),
+    "planes": ("exact blocks", "along the planes of the surface"),
 }
 
 

@@ -96,8 +96,10 @@ def forecast(
     """Return the estimate for this machine under its present load.
 
     unknowns: the number of unknowns of the largest problem that is solved afterwards. A second start, where the first
-    map is not certified, takes the same time again. A body with handles has blocks, which are not trained.
+    map is not certified, takes the same time again. A body with handles has blocks, which are not trained; exact blocks
+    are not optimised either.
     """
+    from parameterize.polyhedra.layout import exact_layout
     from parameterize.training.backend import one_thread_an_operation
     from parameterize.training.effort import points_of_a_step
 
@@ -109,15 +111,18 @@ def forecast(
     last = (REST + LAST_VERTEX * vertices + UNKNOWN * unknowns) * one_pass
     step = NEWTON_STEP * product + NEWTON_VERTEX * vertices * one_pass
     in_blocks = surface.genus > 0
+    is_exact = exact_layout(surface.vertices, surface.faces, 1, config.blocks) is not None
     fits = [
         share * (FIT * product + min(rounds, spline.rounds) * (min(steps, spline.steps) * step + CERTIFICATE * product))
         for (rounds, steps), share in zip((EASY, HARD), BLOCKS if in_blocks else (1.0, 1.0), strict=True)
     ]
-    steps_of_training = (0, 0) if in_blocks else _training_steps(config)
+    if is_exact:
+        fits = [CERTIFICATE * product] * 2
+    steps_of_training = (0, 0) if in_blocks or is_exact else _training_steps(config)
     trainings = [count * TRAINING_STEP * points * one_pass for count in steps_of_training]
     low, high = sorted(training + fit + last for training, fit in zip(trainings, fits, strict=True))
     most = spline.control_points
-    if config.refinement is not None:  # it may end with the first spline, or only at its limit
+    if config.refinement is not None and not is_exact:  # it may end with the first spline, or only at its limit
         most = config.refinement.max_control_points
         rounds, steps = HARD_AFTER
         growths = _growths(config.refinement.max_control_points, spline.control_points)

@@ -285,4 +285,6 @@ def _draw(state: RunFolder, given: MapInput, result: Parameterization) -> None:
         known["places"] = places
     if meeting := result.quality.boundary_check.meeting:
         known["meeting"] = meeting
-    state.draw("map", volume=result.volume, history=result.history, marks=given.marks, **known)
+    if len(next(iter(result.history.values()))):  # exact blocks have no steps
+        known["history"] = result.history
+    state.draw("map", volume=result.volume, marks=given.marks, **known)

@@ -19,6 +19,7 @@ from ..spline.volume import FACE_NAMES, BSplineVolume
 from .distances import Distances
 from .distortion import BoxDistortion, Distortion, arap_grid, in_own_box
 from .proved import proved, proved_of
+from .sharpness import Sharpness, sharpness_of
 from .two_sided import two_sided
 
 Measure = TypeVar("Measure", Distortion, Distances)
@@ -67,6 +68,8 @@ class QualityReport(Shown):
     mesh_samples, spline_samples : int
     proof : dict
         The entries of report.json on what is proved.
+    sharpness : Sharpness
+        The sharp edges of the mesh, how far they are from edges of F, and the angles between normals.
     patches : tuple of BoxDistortion
         Of each of several patches its box, volume, distortion and smallest scaled Jacobian.
 
@@ -94,6 +97,7 @@ class QualityReport(Shown):
     spline_samples: int
     boundary_check: BoundaryCheck
     proof: dict[str, Any]
+    sharpness: Sharpness
     patches: tuple[BoxDistortion, ...] = ()
 
     def as_dict(self) -> dict[str, Any]:
@@ -106,6 +110,7 @@ class QualityReport(Shown):
                 "spline_to_mesh": asdict(self.spline_to_mesh),
                 "two_sided": asdict(self.surface_distance) | {"of_diagonal": asdict(self.relative_distance)},
             },
+            "sharp_edges": self.sharpness.as_dict(),
             "points": {
                 "arap": self.arap_points,
                 "boundary": self.mesh_vertices,
@@ -216,6 +221,7 @@ def measure(
         "diagonal": float(np.linalg.norm(np.ptp(vertices, axis=0))),
         "mesh_samples": len(found.mesh_to_spline.distances),
         "spline_samples": len(found.spline_to_mesh.distances),
+        "sharpness": sharpness_of(body, vertices, faces),
     }
     if isinstance(body, MultiPatch) and isinstance(certificate, BodyCertificate):
         return _of_patches(body, certificate, boundary_check, measured)

@@ -3,7 +3,7 @@
 import logging
 import math
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, Literal
 
@@ -22,6 +22,7 @@ from ..optimization.phases import Schedule
 from ..optimization.sliding import SlidingParameters
 from ..optimization.surface_distance import TANGENTIAL, SurfaceFit
 from ..optimization.term import Weights
+from ..polyhedra.layout import exact_layout
 from ..progress import timed
 from ..skeleton.choice import Choice, choose
 from ..skeleton.graph import Skeleton, SkeletonError
@@ -39,7 +40,7 @@ FEWEST_SPANS = 4  # across a block: with fewer its section cannot become round
 COMPACT = 4.0  # cubed area of the surface over 36 pi, at volume 1: bodies with less have no long limbs, and most have
 # less, so that these need not wait for a skeleton
 _CELL = 0.03  # of the lattice whose points tell the areas of sections, at volume 1
-Origin = Literal["network", "growth", "extension", "blocks"]
+Origin = Literal["network", "growth", "extension", "blocks", "planes"]
 MOST_POINTS = (
     30_000  # added where long edges of the mesh are cut, else they are cut less finely: memory grows with them
 )
@@ -88,10 +89,17 @@ class Task:
     def choice(self) -> Choice:
         """Return whether one cube or several blocks suit the body, and why; the reason is "" where the options say it.
 
-        A body with handles gets blocks. The skeleton of one without handles is looked for only where its surface is
-        much larger than a ball's. Raises SkeletonError for a body with handles that has no skeleton.
+        A body that planes bound gets exact blocks, where there are some; another one with handles gets blocks. The
+        skeleton of one without handles is looked for only where its surface is much larger than a ball's.
+
+        Raises SkeletonError for a body with handles that has no skeleton.
         """
         surface, most = self.surface, self.config.blocks
+        if self.exact is not None:
+            count = len(self.exact)
+            found = Choice("planes", f"bounded by planes: {count} exact block{'s' * (count > 1)}")
+            _log.info("%s", found.reason)
+            return found
         if surface.genus == 0:
             if most is not None or self.given_corners is not None:
                 return Choice("blocks" if (most or 1) > 1 else "cube", "")
@@ -121,6 +129,20 @@ class Task:
         surface = self.surface
         inside = interior_points(surface.unit_vertices, surface.faces, _CELL)
         return handles_of(self.skeleton, inside)
+
+    @cached_property
+    def exact(self) -> BlockLayout | None:
+        """Return exact blocks of a body that planes bound, at volume 1; None for others, and for given corners."""
+        surface, spline, most = self.surface, self.config.spline, self.config.blocks
+        if self.given_corners is not None or len(surface.crossings):
+            return None
+        with timed(self.seconds, "fit"), one_blas_thread():
+            points = surface.to_unit(surface.vertices)
+            found = exact_layout(points, surface.faces, spans_across(spline.control_points), most)
+        if found is None or len(found) > 1:
+            return found
+        spans = spline.control_points - spline.degree
+        return BlockLayout((replace(found.blocks[0], spans=(spans, spans, spans)),), ())
 
     @cached_property
     def layout(self) -> BlockLayout:

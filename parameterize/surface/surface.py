@@ -21,6 +21,7 @@ from .errors import (
     check_indices,
     without_unused_defects,
 )
+from .features import Features, features_of
 from .geometry import deepest_point, signed_volume
 from .groups import Groups, checked, renumbered
 from .holes import Close
@@ -115,6 +116,11 @@ class Surface(Brief, Shown):
         """Return the number of handles."""
         return topology.genus_of(self.faces)
 
+    @cached_property
+    def features(self) -> Features:
+        """Return the sharp edges, those whose triangles meet at more than 40 degrees."""
+        return features_of(self.vertices, self.faces)
+
     @property
     def bbox(self) -> tuple[Array, Array]:
         """Return the lowest and the highest corner of the bounding box, (3,) each, in the user's units."""
@@ -150,6 +156,11 @@ class Surface(Brief, Shown):
                 "first": [
                     {"faces": pair, "near": place} for pair, place in zip(first.tolist(), places.tolist(), strict=True)
                 ],
+            },
+            "sharp_edges": {
+                "edges": len(self.features),
+                "corners": len(self.features.corners),
+                "length": float(self.features.lengths.sum()),
             },
             "groups": [
                 {"name": name, "faces": len(numbers), "area": self.part.area(numbers)}

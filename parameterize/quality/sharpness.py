@@ -1,0 +1,120 @@
+"""How well the edges of blocks follow the sharp edges of a surface, and how much normals differ.
+
+A sharp edge is kept where an edge of F lies on it: elsewhere F is smooth. Normals differ at rounded edges and at horns
+that hardly count as distances.
+"""
+
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from ..arrays import Array, IntArray
+from ..spline.bspline import divided_spans
+from ..spline.multipatch import MultiPatch, as_multipatch
+from ..spline.sampled_boundary import SampledBoundary
+from ..spline.volume import FACE_NAMES, BSplineVolume
+from ..surface.features import Features, features_of
+from ..surface.geometry import normals_and_areas
+from ..surface.nearest import closest_triangles
+from .distances import Distances
+
+_SAMPLES = 2000  # on all sharp edges together, about
+_PER_SPAN = 4  # samples on the edges of blocks, which are curves
+_CANDIDATES = 8  # pieces of these edges with the nearest middles, of which the nearest is taken
+_NORMALS = 40  # samples a direction on the faces of a cube, at which normals are compared
+
+
+@dataclass(frozen=True)
+class Sharpness:
+    """Describe how sharp edges are kept.
+
+    Attributes
+    ----------
+    edges, corners : int
+        The number of sharp edges of the surface, from corner to corner, and of corners.
+    length : float
+        Of all sharp edges, in the user's units.
+    distance : Distances or None
+        From samples on these to the nearest edge of an outer face of F, over the diagonal of the surface's bounding
+        box; None where there are none.
+    normals : Distances
+        Angles in degrees between the normals of F's boundary and of the nearest triangle of the surface; rms and mean
+        over the area.
+    """
+
+    edges: int
+    corners: int
+    length: float
+    distance: Distances | None
+    normals: Distances
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the values in plain Python types."""
+        return asdict(self)
+
+
+def sharpness_of(body: BSplineVolume | MultiPatch, vertices: Array, faces: IntArray) -> Sharpness:
+    """Measure a body against a closed surface, vertices (n, 3) and faces (m, 3), in one unit of length."""
+    found = features_of(vertices, faces)
+    diagonal = float(np.linalg.norm(np.ptp(vertices, axis=0)))
+    distance = None
+    if len(found):
+        distance = Distances.of(distance_to_edges(_samples(found, vertices), body)).scaled(1.0 / diagonal)
+    angles = Distances.of(*_angles(body, vertices, faces))
+    return Sharpness(len(found), len(found.corners), float(found.lengths.sum()), distance, angles)
+
+
+def _samples(found: Features, vertices: Array) -> Array:
+    """Return points (k, 3) that are evenly spread over sharp edges, their ends among them."""
+    step = float(found.lengths.sum()) / _SAMPLES
+    points = []
+    for a, b in vertices[found.edges]:
+        count = max(2, 1 + int(np.ceil(np.linalg.norm(b - a) / step)))
+        points.append(a + np.linspace(0.0, 1.0, count)[:, None] * (b - a))
+    return np.concatenate(points)
+
+
+def distance_to_edges(points: Array, body: BSplineVolume | MultiPatch) -> Array:
+    """Return the distances (k,) of points (k, 3) from the nearest edge of an outer face of a body."""
+    pieces = np.concatenate([curve for patch, names in _outer(body) for curve in _edges(patch, names)])
+    tree = cKDTree(pieces.mean(axis=1))
+    _, near = tree.query(points, k=min(_CANDIDATES, len(pieces)))
+    starts, along = pieces[near, 0], pieces[near, 1] - pieces[near, 0]  # (k, candidates, 3)
+    away = points[:, None] - starts
+    share = np.sum(away * along, axis=-1) / np.maximum(np.sum(along**2, axis=-1), 1e-300)
+    gaps = away - np.clip(share, 0.0, 1.0)[..., None] * along
+    return np.asarray(np.linalg.norm(gaps, axis=-1).min(axis=1))
+
+
+def _outer(body: BSplineVolume | MultiPatch) -> list[tuple[BSplineVolume, tuple[str, ...]]]:
+    """Return the patches of a body with the names of their outer faces."""
+    several = as_multipatch(body)
+    return list(zip(several.patches, several.outer, strict=True))
+
+
+def _edges(patch: BSplineVolume, names: tuple[str, ...]) -> list[Array]:
+    """Return the straight pieces (k, 2, 3) of the edges of some faces of a patch."""
+    found = []
+    for axis in range(3):
+        others = [other for other in range(3) if other != axis]
+        for sides in ((0, 0), (0, 1), (1, 0), (1, 1)):
+            if any(FACE_NAMES[2 * other + side] in names for other, side in zip(others, sides, strict=True)):
+                rows = [np.array([0.0])] * 3
+                rows[axis] = divided_spans(patch.knots[axis], _PER_SPAN)
+                for other, side in zip(others, sides, strict=True):
+                    rows[other] = np.array([float(side)])
+                u, v, w = rows
+                line = patch.grid(u, v, w).reshape(-1, 3)
+                found.append(np.stack([line[:-1], line[1:]], axis=1))
+    return found
+
+
+def _angles(body: BSplineVolume | MultiPatch, vertices: Array, faces: IntArray) -> tuple[Array, Array]:
+    """Return angles (k,) in degrees between normals of a body's boundary and those of a surface, and shares of area."""
+    boundary = SampledBoundary.of(body, _NORMALS)
+    normals, areas = normals_and_areas(boundary.points, boundary.triangles)
+    _, nearest, _ = closest_triangles(boundary.points[boundary.triangles].mean(axis=1), vertices, faces)
+    cosines = np.abs(np.sum(normals * normals_and_areas(vertices, faces[nearest])[0], axis=1))
+    return np.degrees(np.arccos(np.minimum(cosines, 1.0))), areas / areas.sum()
