@@ -244,7 +244,7 @@ def _warm_up(degrees: tuple[int, int, int], degree: int | None, is_scalar: bool)
     knots = [open_uniform_knots(p + 1, p) for p in degrees]
     rows = [greville(row, p) for row, p in zip(knots, degrees, strict=True)]
     cube = BSplineVolume(degrees, tuple(knots), np.stack(np.meshgrid(*rows, indexing="ij"), axis=-1))  # type: ignore[arg-type]
-    problem = Poisson(exact="x*x") if is_scalar else Elasticity(exact=("x*x", "y", "z"))
+    problem = Poisson(exact="sin(x)") if is_scalar else Elasticity(exact=("sin(x)", "y", "z"))
     with compilation_told():
         options = SolveOptions(refine=1, degree=degree, threads=1)
         build(cube, *_on_patches(cube, problem, options), options).solve()

@@ -7,6 +7,7 @@ import os
 import shutil
 import signal
 from collections.abc import Callable
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -146,7 +147,6 @@ def short_training(monkeypatch: pytest.MonkeyPatch, few_distances: None) -> None
 @pytest.fixture
 def in_this_process(monkeypatch: pytest.MonkeyPatch) -> None:
     """Let a batch compute its surfaces one after the other in this process, where a training can be replaced."""
-    from contextlib import nullcontext
     from types import SimpleNamespace
 
     from iga_nn.batch import cluster
@@ -175,11 +175,12 @@ def small_views(monkeypatch: pytest.MonkeyPatch) -> None:
 def in_folder(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest, small_views: None
 ) -> Path:
-    """Make an empty current folder; figures are drawn for tests marked `pictures` only.
+    """Make an empty current folder; figures are drawn in this process, and for tests marked `pictures` only.
 
     What VTK draws, at seconds a figure, is left out for the others, and curves, half of a run without a training, are
     empty files.
     """
+    monkeypatch.setattr("iga_nn.workflow.pipeline.Painter", nullcontext)
     if request.node.get_closest_marker("pictures") is None:
         monkeypatch.setattr("iga_nn.figures.render.can_draw", lambda: False)
         monkeypatch.setattr("iga_nn.figures.style.Picture.savefig", lambda _, path, **__: Path(path).touch())

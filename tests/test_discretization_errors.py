@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+from rational_shapes import octant
 
 from parameterize.spline.bspline import greville, open_uniform_knots
 from parameterize.spline.volume import BSplineVolume
@@ -56,3 +57,21 @@ def test_degree_plus_two_points_integrate_the_square_of_one_degree_more_exactly(
     space = trial_space(volume)
     errors = error_norms([Part(volume, space, np.zeros((1, *space.shape)), lambda x: (x[:1] ** 3, None))])
     assert errors.l2 == pytest.approx(np.sqrt(1.0 / 7.0), rel=1e-14)
+
+
+@pytest.mark.parametrize("threads", [1, 3])
+def test_strips_of_a_plane_and_threads_change_nothing_but_rounding(monkeypatch, threads):
+    """On the octant of a rational shell, with two components; a strip is one row of points."""
+    volume = octant()
+    space = trial_space(volume, 1)
+    coefficients = np.random.default_rng(0).uniform(0.5, 1.5, (2, *space.shape))
+
+    def exact(x):
+        values = np.stack([np.sin(x[0] * x[1]), x[2]])
+        slopes = [x[1] * np.cos(x[0] * x[1]), x[0] * np.cos(x[0] * x[1]), 0 * x[0], 0 * x[0], 0 * x[0], 1 + 0 * x[0]]
+        return values, np.stack(slopes).reshape(2, 3, *x.shape[1:])
+
+    whole = error_norms([Part(volume, space, coefficients, exact)])
+    monkeypatch.setattr("solve.discretization.errors.POINTS", 1)
+    strips = error_norms([Part(volume, space, coefficients, exact)], threads)
+    assert (strips.l2, strips.h1_seminorm) == pytest.approx((whole.l2, whole.h1_seminorm), rel=1e-14)

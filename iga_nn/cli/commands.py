@@ -85,7 +85,7 @@ def _run(mesh: str, output: OutputOptions, mapping: MapOptions, statement: Probl
 
     with shown_progress(output.quiet) as progress:
         outcome = pipeline.parameterize_to(
-            mesh, mapping=mapping, statement=statement, progress=progress, **output.folder
+            mesh, mapping=mapping, statement=statement, progress=progress, paints_beside=True, **output.folder
         )
     return _finish(outcome, output)
 

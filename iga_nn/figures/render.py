@@ -1,12 +1,12 @@
 """Draws surface patches by VTK, off screen, where this machine can draw."""
 
 import logging
-import os
 import subprocess
 import sys
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
+from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Self
 
@@ -15,6 +15,9 @@ from matplotlib.colors import to_rgb
 from numpy.typing import NDArray
 
 from parameterize.arrays import Array
+
+from . import probe
+from .probe import choose_window
 
 log = logging.getLogger(__name__)
 
@@ -25,13 +28,6 @@ NAMELESS: Mapping[str, Array] = MappingProxyType({})
 LETTERS = 15  # pixels
 REMEDY = "apt-get install --no-install-recommends libegl1 libgl1-mesa-dri"
 CANNOT_DRAW = f"VTK cannot draw on this machine; remedy: {REMEDY}"
-PROBE = """
-import pyvista
-plotter = pyvista.Plotter(off_screen=True, window_size=(16, 16))
-plotter.add_mesh(pyvista.Sphere(), color="red")
-image = plotter.screenshot(return_img=True)
-raise SystemExit(0 if image.std() > 1.0 else 1)
-"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,11 +62,10 @@ class View:
 @cache
 def can_draw() -> bool:
     """Return whether VTK can draw here, tried in a child process: without a graphics library it crashes."""
-    if sys.platform == "linux" and not os.environ.get("DISPLAY"):  # then VTK takes EGL, without trying X and warning
-        os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
-    probe = [sys.executable, "-P", "-c", PROBE]
+    choose_window()
+    program = [sys.executable, "-P", str(Path(probe.__file__))]
     try:
-        done = subprocess.run(probe, capture_output=True, timeout=120, check=False).returncode == 0
+        done = subprocess.run(program, capture_output=True, timeout=120, check=False).returncode == 0
     except (OSError, subprocess.TimeoutExpired):
         done = False
     if not done:

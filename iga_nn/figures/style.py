@@ -48,6 +48,8 @@ def panels_of(rows: int, columns: int) -> tuple[Figure, Any]:
     figure, axes = blank(rows, columns, (4.6 * columns, 3.8 * rows + 0.8), squeeze=False)
     for panel in axes.flat:
         panel.set_axis_off()
+        for axis in (panel.xaxis, panel.yaxis):  # else the layout measures the ticks that are not drawn
+            axis.set_visible(False)
     return figure, axes
 
 

@@ -1,6 +1,5 @@
 """Holds one output folder for one run: its report so far, and the clock."""
 
-import logging
 import os
 import shutil
 import time
@@ -14,11 +13,11 @@ from typing import Any
 from parameterize.files import unfinished
 from parameterize.progress import timed
 
-from ..errors import InputError, one_line
+from ..errors import InputError
 from ..report import document as reports
-from ..report.artifacts import ARTIFACTS, REPORT, Part, files_of
-
-log = logging.getLogger(__name__)
+from ..report.artifacts import REPORT, Part, files_of
+from .drawing import Failures, Figures, draw, drawing
+from .painter import Painter
 
 CHECKPOINT = "checkpoint"
 
@@ -37,7 +36,7 @@ class RunFolder:
 
     vector: whether plots of curves are also written as PDF. finished: the result that a resumed run found complete.
     guarded: whether files without a report belong to the user, and are not replaced. make: a function that makes the
-    folder, where it does not exist.
+    folder, where it does not exist. painter: draws the figures beside the run; None where the run draws them.
     """
 
     folder: Path
@@ -45,6 +44,7 @@ class RunFolder:
     finished: Outcome | None = None
     guarded: bool = False
     make: Callable[[], None] | None = None
+    painter: Painter | None = None
     report: reports.Report = field(default_factory=lambda: {"schema": reports.SCHEMA})
     seconds: dict[str, float] = field(default_factory=dict)
     started: float = field(default_factory=time.perf_counter)
@@ -54,32 +54,32 @@ class RunFolder:
         return timed(self.seconds, step)
 
     def draw(self, part: Part, **known: Any) -> None:
-        """Draw the figures of one part of a run for which the values `known`, by their names in the table, suffice."""
-        with self.timed("report"), self.drawing("figures"):
-            from ..figures import render
+        """Draw the figures of one part of a run for which the values `known`, by their names in the table, suffice.
 
-            for figure in ARTIFACTS:
-                if not figure.draw or figure.part != part or not known.keys() >= set(figure.takes):
-                    continue
-                if not figure.is_curve and not render.can_draw():
-                    self._not_drawn(figure.file, render.CANNOT_DRAW)
-                    continue
-                for ending in (".png", ".pdf") if figure.is_curve and self.vector else (".png",):
-                    path = (self.folder / figure.file).with_suffix(ending)
-                    with self.drawing(path.name):
-                        figure.draw_to(path, known)
+        Where there is a painter, they are done at `wait_for_figures`.
+        """
+        figures = Figures(self.folder.resolve(), part, known, self.vector)
+        with self.timed("report"):
+            if self.painter is None or not self.painter.begin(figures):
+                self._tell(draw(figures))
+
+    def wait_for_figures(self) -> None:
+        """Wait until all figures are drawn, and add those that could not be to the report."""
+        if self.painter is not None:
+            with self.timed("report"):
+                self._tell(self.painter.end())
 
     @contextmanager
     def drawing(self, what: str) -> Iterator[None]:
         """Let the block draw `what`; a failure, for example the import of matplotlib or VTK, goes into the report."""
-        try:
+        failures: Failures = {}
+        with drawing(what, failures):
             yield
-        except Exception as error:  # no figure ends a run
-            self._not_drawn(what, one_line(error) or type(error).__name__)
-            log.warning("%s could not be drawn: %s", what, one_line(error))
+        self._tell(failures)
 
-    def _not_drawn(self, what: str, reason: str) -> None:
-        self.report.setdefault("not_drawn", {})[what] = reason
+    def _tell(self, failures: Failures) -> None:
+        if failures:
+            self.report.setdefault("not_drawn", {}).update(failures)
 
     def begin(self, *parts: Part) -> None:
         """Make the folder, or remove from it the report and the files of these parts from an older run.
@@ -111,6 +111,7 @@ class RunFolder:
 
     def finish(self) -> Outcome:
         """Write the total time, which marks the result as finished, and remove the checkpoint."""
+        self.wait_for_figures()
         self.seconds["total"] = time.perf_counter() - self.started
         self.write(seconds=self.seconds)
         if "config" in self.report:  # of a training here

@@ -19,6 +19,7 @@ from parameterize.files import save_text
 from parameterize.progress import ProgressCallback
 from parameterize.spline.multipatch import as_multipatch
 from parameterize.spline.volume import BSplineVolume
+from parameterize.threads import default_threads
 from solve import ConvergenceRow, check_device, check_problem, convergence, modes
 from solve.discretization.slab import agreed
 from solve.forms.boundary_value_problem import BoundaryValueProblem
@@ -45,6 +46,7 @@ from .command_line import command_line
 from .cost_estimate import tell_memory
 from .mapping import MapInput, map_surface, read_input
 from .output_folder import Outcome, RunFolder, default_folder, open_folder
+from .painter import Painter
 from .solving import (
     Found,
     described,
@@ -135,15 +137,21 @@ def parameterize_to(
     force: bool = False,
     vector: bool = False,
     progress: ProgressCallback | None = None,
+    paints_beside: bool = False,
 ) -> Outcome:
-    """Parameterize a surface and, where a problem is given, solve it on the volume, as `run` does."""
+    """Parameterize a surface and, where a problem is given, solve it on the volume, as `run` does.
+
+    paints_beside: whether, with more than one thread, a process beside the run draws the figures; it takes 300 MB.
+    """
     mapping = mapping or MapOptions()
     check_type("mapping", mapping, MapOptions)
     check_type("mesh", mesh, str | Path)
     check_type("out", out, str | Path | None)
     check_type("progress", progress, Callable | None)
     problem, unknowns = (None, 0) if statement is None else checked(mapping, statement)
-    with open_folder(mesh, out, force, mapping.resume, vector) as state:
+    with open_folder(mesh, out, force, mapping.resume, vector) as state, ExitStack() as stack:
+        if paints_beside and not state.finished and default_threads() > 1:
+            state.painter = stack.enter_context(Painter())
         with state.timed("load"):
             given = read_input(mesh, mapping, state.finished.report if state.finished else None)
         identity = _identity(given, statement)

@@ -61,10 +61,10 @@ def solve_levels(
             | {"levels": levels, "rates": rates(found), "notices": [*notices_of(found), *growth]}
         }
     )
-    _write_cells(state, solutions[-1])
     _draw(state, body, solutions, problem, statement.units)
     if len(problem.dirichlet) < 6 or problem.patch_faces:  # the user names faces: show which is which
         state.draw("solution", named_volume=body)
+    _write_cells(state, solutions[-1])
     return solutions[-1]
 
 
@@ -106,6 +106,7 @@ def reported(state: RunFolder, body: Body) -> Iterator[None]:
     try:
         yield
     except (InputError, ConvergenceError) as error:
+        state.wait_for_figures()
         state.write(not_solved=one_line(error))
         known = reports.plain(state.report | {"seconds": state.seconds})
         html.write(state.folder, known, scene_of(state, body))

@@ -10,12 +10,14 @@ from parameterize.arrays import Array
 from parameterize.spline.volume import BSplineVolume
 from parameterize.threads import in_parallel
 
+from ..field import Points
 from . import kernels
-from .quadrature import gauss_rule, geometry_planes
+from .error_kernels import error_squares
+from .quadrature import GaussRule, gauss_rule, geometry_planes, map_rows
 from .space import TrialSpace
 
 PLANES = 16  # of points of u, in a piece of work
-POINTS = 2**16  # of a plane that are evaluated at once: they take dozens of arrays
+POINTS = 2**15  # of a plane that are evaluated at once: their arrays fit into a processor's cache
 
 
 Exact = Callable[[Array], tuple[Array, Array | None]]
@@ -64,35 +66,67 @@ def error_norms(parts: Sequence[Part], threads: int = 1) -> Errors:
     return Errors(l2, ratio(l2, norm), seminorm, ratio(seminorm, slope))
 
 
+@dataclass(frozen=True, eq=False)
+class _Strip:
+    """Hold some rows of the points of every plane: their rule, the tables of w for the map and for u_h, and weights.
+
+    weights: (q_w, q_v), without those of u.
+    """
+
+    rule: GaussRule
+    of_map: kernels.Table
+    of_space: kernels.Table
+    weights: Array
+
+    @classmethod
+    def of(cls, rule: GaussRule, volume: BSplineVolume, space: TrialSpace) -> "_Strip":
+        """Return the strip with the points of a rule."""
+        of_map, of_space = (rule.tabulate(own.degrees, own.knots)[2] for own in (volume, space))
+        return cls(rule, of_map, of_space, np.multiply.outer(rule.weights[2], rule.weights[1]))
+
+    def points(self, lines: Array, q: int) -> Points:
+        """Return the points (3, q_w, q_v) in space from the lines (3 or 4, 3, n_w, q_v) of a map in plane q."""
+        first, basis, functions = self.of_map
+        x = np.empty((len(lines), *self.weights.shape))
+        for line, out in zip(lines, x, strict=True):
+            kernels.contract(first, basis[0], functions, line[0], out)
+        u, v, w = self.rule.points
+        return Points.of(x if len(x) == 3 else x[:3] / x[3], (u[q : q + 1], v, w), (2, 1))
+
+
 def _squares(
     volume: BSplineVolume, space: TrialSpace, coefficients: Array, exact: Exact, threads: int
 ) -> tuple[Array, bool]:
     """Return the integrals of (u - u_h)^2, u^2, |grad u - grad u_h|^2, |grad u|^2, and whether the last are known."""
-    whole, splines = gauss_rule(space, [p + 2 for p in space.degrees]), np.ascontiguousarray(coefficients)
-    strips = [(rule, rule.tabulate(space.degrees, space.knots)) for rule in whole.strips(POINTS)]
-    sums = np.zeros((whole.shape[0], 4))  # plane by plane: the same for any number of threads
+    rule, splines = gauss_rule(space, [p + 2 for p in space.degrees]), np.ascontiguousarray(coefficients)
+    strips = [_Strip.of(strip, volume, space) for strip in rule.strips(POINTS)]
+    tables, sums = rule.tabulate(space.degrees, space.knots), np.zeros((rule.shape[0], 4))
     has_gradient = []
 
     def integrate(points: range) -> None:
-        for rule, tables in strips:
-            fields = np.empty((len(splines), 4, *rule.plane_shape))
-            slopes = np.empty((len(splines), 3, *rule.plane_shape))
-            for q, rows, measure, x in geometry_planes(volume, rule, points):
-                values, gradients = exact(x)
-                scale = np.sqrt(np.abs(measure))
-                for spline, field in zip(splines, fields, strict=True):
-                    kernels.evaluate_plane(spline, q, tables, field)
-                fields[:, 0] *= scale
-                sums[q, :2] += kernels.squares(values[:, None], scale, fields[:, :1])
+        for q, net, of_map in map_rows(volume, rule, points):
+            geometry, found = _lines(net, q, of_map, rule), _lines(splines, q, tables, rule)
+            weight = geometry[3] if len(geometry) > 3 else None
+            for strip in strips:
+                values, gradients = exact(strip.points(geometry, q))
                 has_gradient.append(gradients is not None)
-                if gradients is not None:
-                    kernels.turn(rows, fields[:, 1:], slopes, False)
-                    sums[q, 2:] += kernels.squares(gradients, scale, slopes)
+                for c, own in enumerate(found):
+                    slopes = None if gradients is None else gradients[c]
+                    map_and_spline = geometry, weight, strip.of_map, own, strip.of_space
+                    sums[q] += error_squares(*map_and_spline, strip.weights, values[c], slopes)
 
-    planes = range(whole.shape[0])
+    planes = range(rule.shape[0])
     with space.agreed():
         in_parallel(integrate, [planes[start : start + PLANES] for start in planes[::PLANES]], threads)
-    return sums.sum(axis=0), all(has_gradient)
+    return rule.weights[0] @ sums, all(has_gradient)  # plane by plane: the same for any number of threads
+
+
+def _lines(splines: Array, q: int, tables: kernels.Tables, rule: GaussRule) -> Array:
+    """Return splines (k, n_u, n_v, n_w) contracted in u and v on plane q, (k, 3, n_w, q_v): see `evaluate_lines`."""
+    found = np.empty((len(splines), 3, splines.shape[3], rule.shape[1]))
+    for spline, lines in zip(splines, found, strict=True):
+        kernels.evaluate_lines(spline, q, tables, lines)
+    return found
 
 
 def ratio(error: float, size: float) -> float | None:

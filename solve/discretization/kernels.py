@@ -58,20 +58,31 @@ def spread(first: IntArray, basis: Array, functions: Functions, source: Array, r
 
 
 @compiled
-def evaluate_plane(coefficients: Array, point: int, tables: Tables, result: Array) -> None:
-    """Write a spline and its gradient on the plane of a point of u to result (4, q_w, q_v): value, d/du, d/dv, d/dw."""
-    (first_u, u, functions_u), (first_v, v, functions_v), (first_w, w, functions_w) = tables
+def evaluate_lines(coefficients: Array, point: int, tables: Tables, result: Array) -> None:
+    """Contract a spline (n_u, n_v, n_w) in u and v: write its value, d/du and d/dv to result (3, n_w, q_v).
+
+    The rows of the result are the coefficients in direction w, for all points of v in the plane of a point of u.
+    """
+    (first_u, u, functions_u), (first_v, v, functions_v), _ = tables
     _, n_v, n_w = coefficients.shape
     here, flat, planes = first_u[point : point + 1], coefficients.reshape(-1, n_v * n_w), np.empty((2, n_v, n_w))
     for d in range(2):
         contract(here, u[d, point : point + 1], functions_u, flat, planes[d].reshape(1, -1))
-    lines, turned = np.empty((result.shape[2], n_w)), np.empty((n_w, result.shape[2]))
+    lines = np.empty((result.shape[2], n_w))
     for place in range(3):  # value, d/du, d/dv
         contract(first_v, v[place // 2], functions_v, planes[place % 2], lines)
-        turned[:, :] = lines.T
-        contract(first_w, w[0], functions_w, turned, result[place])
-        if place == 0:
-            contract(first_w, w[1], functions_w, turned, result[3])
+        result[place, :, :] = lines.T
+
+
+@compiled
+def evaluate_plane(coefficients: Array, point: int, tables: Tables, result: Array) -> None:
+    """Write a spline and its gradient on the plane of a point of u to result (4, q_w, q_v): value, d/du, d/dv, d/dw."""
+    first_w, w, functions_w = tables[2]
+    lines = np.empty((3, coefficients.shape[2], result.shape[2]))
+    evaluate_lines(coefficients, point, tables, lines)
+    for place in range(3):
+        contract(first_w, w[0], functions_w, lines[place], result[place])
+    contract(first_w, w[1], functions_w, lines[0], result[3])
 
 
 @compiled
@@ -172,20 +183,3 @@ def turn(rows: Array, source: Array, result: Array, back: bool) -> None:
                     for a in range(3):
                         total += (rows[i, a, q, m] if back else rows[a, i, q, m]) * source[c, a, q, m]
                     result[c, i, q, m] = total
-
-
-@compiled
-def squares(wanted: Array, scale: Array, found: Array) -> tuple[float, float]:
-    """Return the sums of (scale wanted - found)^2 and (scale wanted)^2.
-
-    wanted, found: (c, k, q_w, q_v). scale: (q_w, q_v).
-    """
-    error, size = 0.0, 0.0
-    for c in range(found.shape[0]):
-        for k in range(found.shape[1]):
-            for q in range(found.shape[2]):
-                for m in range(found.shape[3]):
-                    value = scale[q, m] * wanted[c, k, q, m]
-                    error += (value - found[c, k, q, m]) ** 2
-                    size += value * value
-    return error, size

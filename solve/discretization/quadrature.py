@@ -229,24 +229,34 @@ def map_planes(
     The map is (3, 4, q_w, q_v): value and gradient of its components. points: the numbers q, all by default. The arrays
     are reused from one step to the next. A rational volume is the quotient of splines that the kernels evaluate.
     """
-    is_rational = volume.weights is not None
-    net = volume.homogeneous if is_rational else volume.control_points
+    u, v, w = rule.points
+    splines = np.empty((3 if volume.weights is None else 4, 4, *rule.plane_shape))
+    fields = splines[:3]
+    for q, components, tables in map_rows(volume, rule, points):
+        for component, out in zip(components, splines, strict=True):
+            kernels.evaluate_plane(component, q, tables, out)
+        if len(splines) > 3:
+            _divide(fields, splines[3])
+        yield q, fields, Points.of(fields[:, 0], (u[q : q + 1], v, w), (2, 1))
+
+
+def map_rows(
+    volume: BSplineVolume, rule: GaussRule, points: Iterable[int] | None = None
+) -> Iterator[tuple[int, Array, kernels.Tables]]:
+    """Yield for every point q of direction u: q, the control points that count there, and their tables.
+
+    The control points are (3 or 4, p + 1, n_v, n_w), a row of each component or, of a rational volume, homogeneous
+    component: all rows at once would be a second map. points: the numbers q, all by default.
+    """
+    net = volume.control_points if volume.weights is None else volume.homogeneous
     (first, basis, functions), table_v, table_w = rule.tabulate(volume.degrees, volume.knots)
     tables = (np.zeros_like(first), basis, functions), table_v, table_w
     row, components = -1, np.empty((net.shape[-1], 0, 0, 0))
-    splines = np.empty((net.shape[-1], 4, *rule.plane_shape))
-    fields = splines[:3]
-    u, v, w = rule.points
     for q in range(rule.shape[0]) if points is None else points:
-        if first[q] != row:  # the rows of control points that are not zero on a span: all at once would be a second map
+        if first[q] != row:
             row = int(first[q])
-            rows = net[row : row + len(functions)]
-            components = np.ascontiguousarray(np.moveaxis(rows, -1, 0))  # (3 or 4, p + 1, n_v, n_w)
-        for component, out in zip(components, splines, strict=True):
-            kernels.evaluate_plane(component, q, tables, out)
-        if is_rational:
-            _divide(fields, splines[3])
-        yield q, fields, Points.of(fields[:, 0], (u[q : q + 1], v, w), (2, 1))
+            components = np.ascontiguousarray(np.moveaxis(net[row : row + len(functions)], -1, 0))
+        yield q, components, tables
 
 
 def _divide(fields: Array, weight: Array) -> None:

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -39,12 +39,12 @@ class Datum:
     components: int = 1
     face: str = ""
 
-    @property
+    @cached_property
     def formulas(self) -> list[Expression]:
         """Return the entries that are formulas."""
         return [entry for entry in self.entries if isinstance(entry, Expression)]
 
-    @property
+    @cached_property
     def is_formula(self) -> bool:
         """Return whether all derivatives of the datum are known, as for formulas without where, min and max."""
         return len(self.formulas) == len(self.entries) and all(formula.is_smooth for formula in self.formulas)
@@ -165,8 +165,8 @@ def finite(name: str, found: Array, x: Array, entry: Entry | None = None) -> Arr
 
     x: points (3, ...). entry: the source of the values, for the remedy.
     """
-    bad = ~(np.abs(found) <= LARGEST)  # NaN included
-    if bad.any():
+    if found.size and not (found.min() >= -LARGEST and found.max() <= LARGEST):  # NaN included
+        bad = ~(np.abs(found) <= LARGEST)
         fault = f"exceeds {LARGEST:.0e}" if np.isfinite(found[bad].flat[0]) else "is not finite"
         good = found[~bad]
         elsewhere = f"; elsewhere it runs from {good.min():.3g} to {good.max():.3g}" if good.size else ""

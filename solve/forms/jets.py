@@ -13,6 +13,8 @@ import numpy as np
 
 from parameterize.arrays import Array
 
+from .trigonometry import sine_and_cosine
+
 Number = float | Array  # constants stay NumPy scalars (a kind of float): products with 0.0 and 1.0 are then free
 Numbers = tuple[Number, ...]
 Jets = Any  # an array of jets, of dtype object
@@ -92,8 +94,8 @@ class Jet:
         """
         return self._chain(np.abs(self.value), np.sign(self.value), 0.0)
 
-    sin = _function(lambda v: ((sine := np.sin(v)), np.cos(v), -sine))
-    cos = _function(lambda v: ((cosine := np.cos(v)), -np.sin(v), -cosine))
+    sin = _function(lambda v: ((pair := sine_and_cosine(v))[0], pair[1], -pair[0]))
+    cos = _function(lambda v: ((pair := sine_and_cosine(v))[1], -pair[0], -pair[1]))
     tan = _function(lambda v: ((t := np.tan(v)), (slope := 1.0 + t * t), 2.0 * t * slope))
     tanh = _function(lambda v: ((t := np.tanh(v)), (slope := 1.0 - t * t), -2.0 * t * slope))
     exp = _function(lambda v: ((value := np.exp(v)), value, value))
