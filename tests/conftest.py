@@ -124,8 +124,14 @@ def few_distances(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(SampledBoundary.of.__func__, "__defaults__", FEW)
 
 
+@pytest.fixture(scope="module")
+def trained() -> dict[Any, Any]:
+    """What short trainings of a file have found: what is asked for again would be the same bits."""
+    return {}
+
+
 @pytest.fixture
-def short_training(monkeypatch: pytest.MonkeyPatch, few_distances: None) -> None:
+def short_training(monkeypatch: pytest.MonkeyPatch, few_distances: None, trained: dict[Any, Any]) -> None:
     """Train and optimise for about a second wherever a training is asked for, with at most 8 control points."""
     from small_run import shortened
 
@@ -138,7 +144,13 @@ def short_training(monkeypatch: pytest.MonkeyPatch, few_distances: None) -> None
     @functools.wraps(full)
     def parameterize(surface: Any, config: Any = None, **options: Any) -> Any:
         short = shortened(config or preset("fast"))
-        return full(surface, short.with_control_points(min(8, short.spline.control_points)), **options)
+        short = short.with_control_points(min(8, short.spline.control_points))
+        changes_nothing = ("progress", "checkpoint_dir")
+        given = {name: str(value) for name, value in options.items() if name not in changes_nothing}
+        asked = (surface.name, surface.sha256, short, *sorted(given.items()))
+        if asked not in trained:
+            trained[asked] = full(surface, short, **options)
+        return trained[asked]
 
     monkeypatch.setattr(home, "parameterize", parameterize)
     monkeypatch.setattr(iga_nn, "parameterize", parameterize, raising=False)

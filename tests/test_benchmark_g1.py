@@ -230,6 +230,7 @@ def test_an_interruption_keeps_the_rows(formula, formula_training, monkeypatch, 
     )
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
 def test_models_run_in_processes_of_their_own(tmp_path):
     surface = small_surface()

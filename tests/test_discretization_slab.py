@@ -31,17 +31,20 @@ def alone():
 
 
 @pytest.fixture(scope="module")
-def job(tmp_path_factory):
-    """The folder of what groups of processes have found."""
+def job(tmp_path_factory, request):
+    """The folder of what groups of so many processes have found."""
     folder = tmp_path_factory.mktemp("job")
-    done = mpiexec(7, "mpi_cases.py", folder, cwd=folder)
+    done = mpiexec(request.param, "mpi_cases.py", folder, cwd=folder)
     assert done.returncode == 0, done.stdout + done.stderr
     return folder
 
 
-@pytest.mark.parametrize("ranks", [1, 2, 4, 7])
+JOBS = [(3, 1), (3, 2), (3, 3), *(pytest.param(7, ranks, marks=pytest.mark.slow) for ranks in (1, 2, 4, 7))]
+
+
+@pytest.mark.parametrize(("job", "ranks"), JOBS, indirect=["job"])
 def test_processes_find_the_solution_of_a_single_one(ranks, alone, job):
-    """Of 7 processes some have no span where u has 3 or 4."""
+    """Of 3 processes one has no span where u has 2; of 7 some have none where it has 3 or 4."""
     found = json.loads((job / str(ranks) / "found.json").read_text())
     assert found.pop("refused") == ranks
     assert found.keys() == alone.keys()

@@ -143,11 +143,16 @@ def test_errors_of_any_size_are_drawn(size, tmp_path, small_views):
     zero = solve.Poisson(exact="0")
     draw_error(tmp_path / "error.png", volume, field, zero)
     draw_values(tmp_path / "values.png", volume, field, "u")
-    draw_study(tmp_path / "study.png", {3: [solve.ConvergenceRow(solution.report, None, None)]})
     from iga_nn.report.viewer import scene_of
 
     said = {entry["name"]: entry["remark"] for entry in scene_of(volume, field, zero)["fields"]}
     assert ("everywhere" in said["solution"]) and (("everywhere" in said["error"]) == (size < 1e-200))
+
+
+def test_a_study_of_a_solution_that_is_zero_is_drawn(tmp_path):
+    solution = solve.solve_problem(benchmark_volume(1), solve.Poisson(source="0"))
+    draw_study(tmp_path / "study.png", {3: [solve.ConvergenceRow(solution.report, None, None)]})
+    assert (tmp_path / "study.png").is_file()
 
 
 def test_ranges_by_hand():

@@ -1,6 +1,7 @@
 """Maps that grow from a cube: the layout without flips, the first map, the rounds and an interruption in them."""
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -97,11 +98,17 @@ def test_a_bent_rod_is_certified_without_a_trained_network():
     assert result.quality.boundary.unit_volume.rms < 0.01
 
 
+@cache
+def grown():
+    """A short rod, options, and its map, which nothing interrupts; the tests of interruptions shorten its growth."""
+    surface, config = bent_rod(300), hard(tiny_config())
+    return surface, config, parameterize(surface, config, seed=1, device="cpu")
+
+
 @pytest.mark.parametrize(("rounds", "kept"), [(1, "spline-1-coarse"), (3, "spline-1")])
 def test_an_interrupted_growth_goes_on_to_the_same_bits(tmp_path, monkeypatch, rounds, kept):
     monkeypatch.setattr("parameterize.starts.growth.SHARES", (0.1, 1.0))
-    surface, config = bent_rod(300), hard(tiny_config())
-    whole = parameterize(surface, config, seed=1, device="cpu")
+    surface, config, whole = grown()
 
     def interrupt(state: Progress):
         if state.stage == "spline" and state.step > rounds * config.spline.steps:
