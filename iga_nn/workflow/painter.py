@@ -41,7 +41,7 @@ class Painter:
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             env=os.environ | {"PYTHONPATH": places},
-            start_new_session=True,  # else Ctrl-C in a terminal would reach it, too
+            process_group=0,  # else Ctrl-C in a terminal would reach it, too
         )
 
     def __enter__(self) -> Painter:
@@ -93,7 +93,7 @@ class Painter:
 
 def main() -> None:
     """Draw what comes in, until the input ends."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # where there are no sessions
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # where there are no process groups
     answers = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # what libraries print is no answer
     given: SimpleQueue[Figures] = SimpleQueue()
