@@ -21,7 +21,7 @@ from .prisms import columns
 from .sheets import merged_cells
 
 MOST_BLOCKS = 150  # a body that needs more is not made of blocks
-LEAST_QUALITY = 0.1  # the smallest scaled Jacobian at a corner, six degrees from flat
+LEAST_QUALITY = 0.1  # of a block: a corner is six degrees from flat, or det J a thousandth of that at another corner
 _SAME = 1e-5  # relative: the volume and the area of blocks that fill a body are those of its surface
 FEWEST_SPANS = 2  # along an edge of a block
 _LONGEST = 4  # times the spans of a block that is a cube: those along one direction, at most
