@@ -50,14 +50,17 @@ def _divisions(body: Polyhedron, most: int) -> Iterator[Hexahedra]:
     Cells that have the faces of cubes are not divided any more.
     """
     yield from (found for found in columns(body) if len(found) <= most)
-    cells = arrangement_of(body)
-    merged = None if cells is None else merged_cells(cells)
-    if cells is None or merged is None or len(merged) > most:
-        return
-    if (whole := cubes(cells.points, merged)) is not None:
-        yield whole
-    elif sum(len(cell.corners) for cell in merged) <= most and (parts := subdivided(cells.points, merged)) is not None:
-        yield parts
+    for upright in (False, True):
+        cells = arrangement_of(body, upright=upright)
+        merged = None if cells is None else merged_cells(cells)
+        if cells is None or merged is None or len(merged) > most:
+            continue
+        if (whole := cubes(cells.points, merged)) is not None:
+            yield whole
+            continue
+        parts = subdivided(cells.points, merged) if sum(len(cell.corners) for cell in merged) <= most else None
+        if parts is not None:
+            yield parts
 
 
 def _layout(found: Hexahedra, spans: int) -> BlockLayout:
