@@ -67,6 +67,13 @@ def test_numbers_in_single_precision_do():
     assert len(layout) == 3 and distance_to_mesh(outside(layout), vertices, faces).max() < 1e-6
 
 
+def test_a_block_below_a_pyramid_is_cut_upright():
+    layout = exact_layout(*arrays("flat pyramid on a block"), 6)
+    boxes = [np.moveaxis(block.sections, 0, 2).reshape(8, 3) for block in layout.blocks]
+    assert sum(len(np.unique(corners.round(9), axis=0)) == 8 and np.ptp(corners[:, 2]) == 1.0 for corners in boxes) == 9
+    assert {tuple(np.unique(corners[:, 0].round(9))) for corners in boxes} >= {(-1.0, -0.6), (-0.6, 0.6), (0.6, 1.0)}
+
+
 def test_bodies_without_exact_blocks_have_none():
     octahedron = hull((1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0), (0, 0, 1), (0, 0, -1))  # four faces at a corner
     shaft = prism(ring(80, 1.0), 1.0)  # too round

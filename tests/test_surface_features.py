@@ -7,6 +7,7 @@ from shapes import ball
 
 from parameterize.surface.features import SHARP, features_of
 from parameterize.surface.geometry import edge_triangles, normals_and_areas
+from parameterize.surface.surface import surface_from_arrays
 
 
 def test_an_l_has_eighteen_edges_and_twelve_corners():
@@ -15,6 +16,11 @@ def test_an_l_has_eighteen_edges_and_twelve_corners():
     assert (len(found), len(found.corners)) == (18, 12)
     assert found.lengths.sum() == pytest.approx(2 * 12.0 + 6 * 2.0)
     assert found.edges.shape == (18 * 5, 2)
+
+
+def test_the_answer_of_check_counts_them():
+    facts = surface_from_arrays(*arrays("box")).summary()["sharp_edges"]
+    assert facts == {"edges": 12, "corners": 8, "length": pytest.approx(24.0)}
 
 
 def test_the_rims_of_a_shaft_are_closed_and_its_sides_smooth():

@@ -14,6 +14,7 @@ from .polyhedron import Polyhedron
 
 NEAR = 1e-5  # of the diagonal: points this near to a plane lie in it, and this near to a vertex are the vertex
 MOST_CELLS = 2000  # in the box: with more the planes do not divide the body into few blocks
+_PARALLEL = 1e-6  # difference of two unit normals that are taken for one
 _MARGIN = 0.1  # of the diagonal, between the body and the box
 _BOX = -1  # the number of the planes of the box
 
@@ -40,9 +41,18 @@ class Arrangement:
     offsets: Array
 
 
-def arrangement_of(body: Polyhedron) -> Arrangement | None:
-    """Return the cells of a body between the planes of its faces; None for more than MOST_CELLS."""
+def arrangement_of(body: Polyhedron, *, upright: bool = False) -> Arrangement | None:
+    """Return the cells of a body between the planes of its faces; None for more than MOST_CELLS.
+
+    upright: cut along planes through re-entrant edges, too, at right angles to the faces there; None is returned where
+    all of these are planes of faces.
+    """
     normals, offsets = _different_planes(body)
+    if upright:
+        count = len(normals)
+        normals, offsets = _with_upright(body, normals, offsets)
+        if len(normals) == count:
+            return None
     points, cells = _box(body)
     near = NEAR * body.diagonal
     for number, (normal, offset) in enumerate(zip(normals, offsets, strict=True)):
@@ -65,6 +75,26 @@ def _different_planes(body: Polyhedron) -> tuple[Array, Array]:
             normals.append(body.planes.normals[number])
             offsets.append(float(body.planes.offsets[number]))
     return np.array(normals), np.array(offsets)
+
+
+def _with_upright(body: Polyhedron, normals: Array, offsets: Array) -> tuple[Array, Array]:
+    """Return the planes, normals (k, 3) and offsets (k,), with those through re-entrant edges at right angles to faces.
+
+    A plane that is known already is left out.
+    """
+    for one, other, a, b in body.edges:
+        along = body.vertices[b] - body.vertices[a]
+        if np.cross(body.planes.normals[one], body.planes.normals[other]) @ along >= 0.0:
+            continue
+        for face in (one, other):
+            normal = np.cross(body.planes.normals[face], along)
+            normal /= np.linalg.norm(normal)
+            offset = float(normal @ body.vertices[a])
+            sides = np.sign(normals @ normal)
+            same = np.abs(sides[:, None] * normals - normal).max(axis=1) < _PARALLEL
+            if not np.any(same & (np.abs(sides * offsets - offset) < NEAR * body.diagonal)):
+                normals, offsets = np.vstack([normals, normal]), np.append(offsets, offset)
+    return normals, offsets
 
 
 def _box(body: Polyhedron) -> tuple[Array, list[Cell]]:

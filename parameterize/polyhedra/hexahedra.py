@@ -30,8 +30,14 @@ class Hexahedra:
 
     @cached_property
     def quality(self) -> float:
-        """Return the smallest scaled Jacobian at a corner of any: 1 for right angles, 0 and below for folds."""
-        return float(_scaled_jacobians(self.points[self.corners]).min())
+        """Return the smallest quality of any: 1 for a box, 0 and below for one with a fold at a corner.
+
+        It is the smallest scaled Jacobian at a corner, times the cube root of the ratio of det J at its corners, as one
+        that ends in a sliver is no better than one with a flat corner.
+        """
+        dets, scaled = _jacobians(self.points[self.corners])
+        ratios = dets.min(axis=1) / np.maximum(np.abs(dets).max(axis=1), 1e-300)
+        return float((scaled.min(axis=1) * np.cbrt(np.maximum(ratios, 0.0))).min())
 
     @property
     def cost(self) -> float:
@@ -46,11 +52,12 @@ class Hexahedra:
         return Hexahedra(self.points, np.array([_turned(self.points, one) for one in self.corners]))
 
 
-def _scaled_jacobians(corners: Array) -> Array:
-    """Return the scaled Jacobians (k, 2, 2, 2) at the corners of hexahedra (k, 2, 2, 2, 3)."""
+def _jacobians(corners: Array) -> tuple[Array, Array]:
+    """Return det J and the scaled Jacobians (k, 8) at the corners of hexahedra (k, 2, 2, 2, 3)."""
     along = [np.repeat(np.diff(corners, axis=axis), 2, axis=axis) for axis in (1, 2, 3)]
-    units = [row / np.maximum(np.linalg.norm(row, axis=-1, keepdims=True), 1e-300) for row in along]
-    return np.asarray(np.sum(np.cross(units[0], units[1]) * units[2], axis=-1))
+    dets = np.sum(np.cross(along[0], along[1]) * along[2], axis=-1)
+    lengths = np.prod([np.linalg.norm(row, axis=-1) for row in along], axis=0)
+    return dets.reshape(-1, 8), (dets / np.maximum(lengths, 1e-300)).reshape(-1, 8)
 
 
 def _turned(points: Array, corners: IntArray) -> IntArray:

@@ -21,7 +21,7 @@ from .prisms import columns
 from .sheets import merged_cells
 
 MOST_BLOCKS = 150  # a body that needs more is not made of blocks
-LEAST_QUALITY = 0.1  # the smallest scaled Jacobian at a corner, six degrees from flat
+LEAST_QUALITY = 0.1  # of a block: a corner is six degrees from flat, or det J a thousandth of that at another corner
 _SAME = 1e-5  # relative: the volume and the area of blocks that fill a body are those of its surface
 FEWEST_SPANS = 2  # along an edge of a block
 _LONGEST = 4  # times the spans of a block that is a cube: those along one direction, at most
@@ -50,14 +50,17 @@ def _divisions(body: Polyhedron, most: int) -> Iterator[Hexahedra]:
     Cells that have the faces of cubes are not divided any more.
     """
     yield from (found for found in columns(body) if len(found) <= most)
-    cells = arrangement_of(body)
-    merged = None if cells is None else merged_cells(cells)
-    if cells is None or merged is None or len(merged) > most:
-        return
-    if (whole := cubes(cells.points, merged)) is not None:
-        yield whole
-    elif sum(len(cell.corners) for cell in merged) <= most and (parts := subdivided(cells.points, merged)) is not None:
-        yield parts
+    for upright in (False, True):
+        cells = arrangement_of(body, upright=upright)
+        merged = None if cells is None else merged_cells(cells)
+        if cells is None or merged is None or len(merged) > most:
+            continue
+        if (whole := cubes(cells.points, merged)) is not None:
+            yield whole
+            continue
+        parts = subdivided(cells.points, merged) if sum(len(cell.corners) for cell in merged) <= most else None
+        if parts is not None:
+            yield parts
 
 
 def _layout(found: Hexahedra, spans: int) -> BlockLayout:

@@ -39,6 +39,17 @@ class Polyhedron:
         """Return the vertices at which faces have corners, ascending."""
         return np.unique([vertex for face in self.loops for loop in face for vertex in loop])
 
+    @property
+    def edges(self) -> list[tuple[int, int, int, int]]:
+        """Return two faces at each edge and its two ends, in the order in which the first face runs through them."""
+        sides = {
+            (a, b): number
+            for number, loops in enumerate(self.loops)
+            for loop in loops
+            for a, b in zip(loop, loop[1:] + loop[:1], strict=True)
+        }
+        return [(face, sides[b, a], a, b) for (a, b), face in sides.items() if a < b and (b, a) in sides]
+
     @cached_property
     def diagonal(self) -> float:
         """Return the diagonal of the box around the body."""

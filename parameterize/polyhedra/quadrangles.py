@@ -7,7 +7,7 @@ into four and each triangle left into three, from its middle.
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from itertools import combinations
+from itertools import combinations, islice
 
 import numpy as np
 from scipy.optimize import Bounds, LinearConstraint, milp
@@ -15,7 +15,7 @@ from scipy.optimize import Bounds, LinearConstraint, milp
 from ..arrays import Array
 from ..surface.triangulation import triangulate
 
-LEAST = 0.25  # the sine of the sharpest and of the bluntest angle of a quadrangle that is taken, about 15 degrees
+LEAST = 0.15  # the sine of the sharpest and of the bluntest angle of a quadrangle that is taken, about nine degrees
 _MOST_TRIED = 40  # sets of points on edges
 _MOST_ADDED = 2  # points on edges
 
@@ -58,18 +58,16 @@ def quadrangles_of(points: Array, loops: Sequence[Loop]) -> Quadrangles | None:
 
 
 def _divisions(points: Array, loops: Sequence[Loop]) -> Iterator[Quadrangles]:
-    """Yield divisions without points on edges, then with one, then with two, and one with all divided."""
+    """Yield divisions without points on edges, then with one or two, of long edges first, and one with all divided."""
     edges = [(a, b) for loop in loops for a, b in zip(loop, loop[1:] + loop[:1], strict=True)]
-    tried = 0
-    parity = (sum(map(len, loops)) + 2 * len(loops)) % 2  # of the number of triangles: that of added points, too
-    for count in range(parity, _MOST_ADDED + 1, 2):
-        for chosen in combinations(edges, count):
-            if (tried := tried + 1) > _MOST_TRIED:
-                return
-            rows, paths, parents = _with_middles(points, loops, chosen)
-            pairs, left = _matched(rows, _triangles(rows, paths))
-            if not left:
-                yield Quadrangles(rows, tuple(pairs), parents)
+    long = sorted(edges, key=lambda edge: -float(np.linalg.norm(points[edge[0]] - points[edge[1]])))
+    parity = sum(map(len, loops)) % 2  # of the number of triangles, and so of the points that have to be added
+    sets = (chosen for count in range(parity, _MOST_ADDED + 1, 2) for chosen in combinations(long, count))
+    for chosen in islice(sets, _MOST_TRIED):
+        rows, paths, parents = _with_middles(points, loops, chosen)
+        pairs, left = _matched(rows, _triangles(rows, paths))
+        if not left:
+            yield Quadrangles(rows, tuple(pairs), parents)
     pairs, left = _matched(points, _triangles(points, loops))
     yield _all_divided(points, [*pairs, *left], set(edges))
 
@@ -110,16 +108,21 @@ def _triangles(points: Array, loops: Sequence[Loop]) -> list[Triangle]:
 
 
 def _bridged(points: Array, path: list[int], hole: Loop, loops: Sequence[Loop]) -> list[int]:
-    """Return a polygon with a hole joined to it by the shortest line that meets no edge."""
+    """Return a polygon with a hole joined to it by the shortest line that meets no edge.
+
+    Where rounding makes all lines meet one, the shortest is taken; what does not fill the body then is refused later.
+    """
     edges = [(a, b) for loop in loops for a, b in zip(loop, loop[1:] + loop[:1], strict=True)]
     lines = sorted(
         (float(np.linalg.norm(points[a] - points[b])), i, k) for i, a in enumerate(path) for k, b in enumerate(hole)
     )
-    for _, i, k in lines:
-        a, b = path[i], hole[k]
-        if not any(_cross(points, a, b, c, d) for c, d in edges if not {a, b} & {c, d}):
-            return [*path[: i + 1], *hole[k:], *hole[: k + 1], *path[i:]]
-    raise AssertionError("a hole sees the rest of its polygon")
+    free = (
+        (i, k)
+        for _, i, k in lines
+        if not any(_cross(points, path[i], hole[k], c, d) for c, d in edges if not {path[i], hole[k]} & {c, d})
+    )
+    i, k = next(free, lines[0][1:])
+    return [*path[: i + 1], *hole[k:], *hole[: k + 1], *path[i:]]
 
 
 def _cross(points: Array, a: int, b: int, c: int, d: int) -> bool:

@@ -1,8 +1,9 @@
 """Merges the cells of an arrangement across all cuts that no re-entrant edge of the body needs.
 
 The facets between cells that lie in one plane and are connected form a sheet. Without a sheet, the cells on both sides
-of each of its facets become one, and all others still have whole facets in common, provided that the sheet does not end
-at a re-entrant edge: there one side of it is a face of the body.
+of each of its facets become one, and all others still have whole facets in common, provided that this holds at
+re-entrant edges, at which sheets end: the angle between two sheets or faces that follow each other there must not be
+too large. Where some of several sheets suffice, those stay that are nearer to right angles.
 """
 
 from collections import defaultdict
@@ -12,7 +13,11 @@ import numpy as np
 
 from ..arrays import Array, IntArray
 from ..surface.geometry import connected
-from .arrangement import NEAR, Arrangement
+from .arrangement import Arrangement, Facet
+
+_STRAIGHT = 1e-4  # radians: sheets and faces that differ less from one plane are in one
+_WIDEST = 0.56 * np.pi  # an angle between two sheets at a re-entrant edge that is left, little above a right angle:
+# at wider ones the cells of a flat pyramid and of the block below it would become one
 
 Edge = tuple[int, int]
 
@@ -40,9 +45,9 @@ def merged_cells(found: Arrangement) -> tuple[ConvexCell, ...] | None:
     keys = list(owners)
     inner = [key for key in keys if len(owners[key]) == 2]
     outer = [key for key in keys if len(owners[key]) == 1]
-    needed = _needed_edges(found, [(owners[key][0][1], rings[key]) for key in outer])
-    sheets = _sheets([(owners[key][0][1], rings[key]) for key in inner])
-    kept = {int(sheets[k]) for k, key in enumerate(inner) if needed & set(_edges(rings[key]))}
+    facets, between = ([(owners[key][0][1], rings[key]) for key in keys] for keys in (outer, inner))
+    sheets = _sheets(between)
+    kept = _kept(found, facets, between, sheets)
     links = [[cell for cell, _ in owners[key]] for k, key in enumerate(inner) if int(sheets[k]) not in kept]
     group = connected(np.array(links, dtype=np.int64).reshape(-1, 2), len(found.cells))
     faces: dict[int, dict[int, list[tuple[tuple[int, ...], int]]]] = defaultdict(lambda: defaultdict(list))
@@ -61,23 +66,83 @@ def _edges(ids: tuple[int, ...]) -> list[Edge]:
     return [(min(a, b), max(a, b)) for a, b in zip(ids, ids[1:] + ids[:1], strict=True)]
 
 
-def _needed_edges(found: Arrangement, outer: list[tuple[int, tuple[int, ...]]]) -> set[Edge]:
-    """Return the re-entrant edges between facets on the body's boundary, each a plane and points."""
-    size = NEAR * float(np.linalg.norm(np.ptp(found.points, axis=0)))
-    at: dict[Edge, list[int]] = defaultdict(list)
-    for number, (_, ids) in enumerate(outer):
-        for edge in _edges(ids):
-            at[edge].append(number)
-    needed = set[Edge]()
+def _kept(found: Arrangement, outer: list[Facet], inner: list[Facet], sheets: IntArray) -> set[int]:
+    """Return the sheets that have to stay: without any one of them an angle at a re-entrant edge is too large.
+
+    The others go one by one, first that which leaves the smallest angles, then that which is least at right angles to
+    the faces that it crosses.
+
+    outer, inner: the facets on the body's boundary and inside. sheets: that of each facet inside.
+    """
+    normals = [_normal(found.points[list(ids)]) for _, ids in outer]
+    at, meeting = _by_edge(outer), _by_edge(inner)
+    fans: dict[Edge, list[tuple[int, float]]] = {}
+    squareness: dict[int, float] = defaultdict(lambda: 1.0)
     for edge, numbers in at.items():
-        (plane, ids), (other, others) = (outer[numbers[k]] for k in (0, -1))
-        if len(numbers) == 2 and plane == other:
-            continue
-        normal = _normal(found.points[list(ids)])
-        height = (found.points[list(others)] - found.points[edge[0]]) @ normal
-        if len(numbers) != 2 or height.max() > size:
-            needed.add(edge)
-    return needed
+        fan = _fan(found, edge, [(outer[number], normals[number]) for number in numbers])
+        for k in meeting.get(edge, ()) if fan is None else ():
+            sines = [float(np.linalg.norm(np.cross(found.normals[inner[k][0]], normals[number]))) for number in numbers]
+            squareness[int(sheets[k])] = min(squareness[int(sheets[k])], *sines)
+        if fan is not None:
+            start, turn = fan
+            fans[edge] = [(-1, 0.0), (-1, turn)] + [
+                (int(sheets[k]), _angle(found, edge, inner[k][1], start)) for k in meeting.get(edge, ())
+            ]
+    kept = {sheet for fan in fans.values() for sheet, _ in fan if sheet >= 0}
+    around = {sheet: [fan for fan in fans.values() if any(own == sheet for own, _ in fan)] for sheet in kept}
+    while kept:
+        widest = {
+            sheet: max(_widest([angle for own, angle in fan if own in kept - {sheet} or own < 0]) for fan in own_fans)
+            for sheet, own_fans in around.items()
+            if sheet in kept
+        }
+        goes = min(kept, key=lambda sheet: (round(widest[sheet], 6), squareness[sheet], sheet))
+        if widest[goes] > _WIDEST:
+            break
+        kept -= {goes}
+    return kept
+
+
+def _by_edge(facets: list[Facet]) -> dict[Edge, list[int]]:
+    """Return the numbers of the facets at each edge."""
+    found: dict[Edge, list[int]] = defaultdict(list)
+    for number, (_, ids) in enumerate(facets):
+        for edge in _edges(ids):
+            found[edge].append(number)
+    return found
+
+
+def _fan(found: Arrangement, edge: Edge, faces: list[tuple[Facet, Array]]) -> tuple[tuple[Array, Array], float] | None:
+    """Return two directions across a re-entrant edge, and the angle of the body there; None for any other edge.
+
+    Angles are measured from the first direction, which lies in a face, to the second one, which leads into the body.
+    faces: those of the body at the edge, with their outward normals. Where four faces meet no angle is too large.
+    """
+    (first, normal), (last, _) = faces[0], faces[-1]
+    start = _across(found, edge, first[1]), -normal
+    turn = _angle(found, edge, last[1], start)
+    if len(faces) != 2:
+        return start, 2.0 * np.pi * len(faces)
+    return (start, turn) if first[0] != last[0] and turn > np.pi + _STRAIGHT else None
+
+
+def _across(found: Arrangement, edge: Edge, ids: tuple[int, ...]) -> Array:
+    """Return the unit vector (3,) in a facet that leads away from one of its edges."""
+    along = found.points[edge[1]] - found.points[edge[0]]
+    away = found.points[list(ids)].mean(axis=0) - found.points[edge[0]]
+    away = away - (away @ along) / (along @ along) * along
+    return np.asarray(away / np.linalg.norm(away))
+
+
+def _angle(found: Arrangement, edge: Edge, ids: tuple[int, ...], start: tuple[Array, Array]) -> float:
+    """Return the angle, from 0 to 2 pi, by which a facet at an edge is turned from a first direction to a second."""
+    away = _across(found, edge, ids)
+    return float(np.arctan2(away @ start[1], away @ start[0]) % (2.0 * np.pi))
+
+
+def _widest(angles: list[float]) -> float:
+    """Return the largest difference of angles that follow each other."""
+    return float(np.diff(sorted(angles)).max())
 
 
 def _normal(points: Array) -> Array:
@@ -86,7 +151,7 @@ def _normal(points: Array) -> Array:
     return np.asarray(normal / np.linalg.norm(normal))
 
 
-def _sheets(inner: list[tuple[int, tuple[int, ...]]]) -> IntArray:
+def _sheets(inner: list[Facet]) -> IntArray:
     """Return the sheet of each facet inside the body, each a plane and points: those in one plane with common edges."""
     at: dict[tuple[int, Edge], int] = {}
     links = []

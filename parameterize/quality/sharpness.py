@@ -7,8 +7,8 @@ that hardly count as distances.
 from dataclasses import asdict, dataclass
 from typing import Any
 
+import igl
 import numpy as np
-from scipy.spatial import cKDTree
 
 from ..arrays import Array, IntArray
 from ..spline.bspline import divided_spans
@@ -22,7 +22,6 @@ from .distances import Distances
 
 _SAMPLES = 2000  # on all sharp edges together, about
 _PER_SPAN = 4  # samples on the edges of blocks, which are curves
-_CANDIDATES = 8  # pieces of these edges with the nearest middles, of which the nearest is taken
 _NORMALS = 40  # samples a direction on the faces of a cube, at which normals are compared
 
 
@@ -79,13 +78,9 @@ def _samples(found: Features, vertices: Array) -> Array:
 def distance_to_edges(points: Array, body: BSplineVolume | MultiPatch) -> Array:
     """Return the distances (k,) of points (k, 3) from the nearest edge of an outer face of a body."""
     pieces = np.concatenate([curve for patch, names in _outer(body) for curve in _edges(patch, names)])
-    tree = cKDTree(pieces.mean(axis=1))
-    _, near = tree.query(points, k=min(_CANDIDATES, len(pieces)))
-    starts, along = pieces[near, 0], pieces[near, 1] - pieces[near, 0]  # (k, candidates, 3)
-    away = points[:, None] - starts
-    share = np.sum(away * along, axis=-1) / np.maximum(np.sum(along**2, axis=-1), 1e-300)
-    gaps = away - np.clip(share, 0.0, 1.0)[..., None] * along
-    return np.asarray(np.linalg.norm(gaps, axis=-1).min(axis=1))
+    ends = np.ascontiguousarray(pieces.reshape(-1, 3))
+    squared = igl.point_mesh_squared_distance(points, ends, np.arange(len(ends)).reshape(-1, 2))[0]
+    return np.sqrt(np.asarray(squared).ravel())
 
 
 def _outer(body: BSplineVolume | MultiPatch) -> list[tuple[BSplineVolume, tuple[str, ...]]]:

@@ -14,7 +14,7 @@ class AttemptReport:
     ----------
     start : str
         The name of the start.
-    origin : "network", "growth" or "extension"
+    origin : "network", "growth", "extension", "blocks" or "planes"
         The kind of start.
     ending : str
         Why its rounds ended.

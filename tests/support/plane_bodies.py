@@ -59,6 +59,7 @@ BODIES = {  # what makes each body, and the number of its blocks
     "pocket": (lambda: box((0, 0, 0), (3, 3, 2)) - box((1, 1, 1), (2, 2, 3)), 17),
     "tunnel": (lambda: box((0, 0, 0), (3, 3, 2)) - box((1, 1, -1), (2, 2, 3)), 8),
     "pyramid on a block": (lambda: box((-1, -1, 0), (1, 1, 1)) + frustum(1.2, 0.6, 0.8, z=1.0), 10),
+    "flat pyramid on a block": (lambda: box((-1, -1, 0), (1, 1, 1)) + frustum(1.2, 0.4, 0.3, z=1.0), 10),
     "L with a chamfer": (lambda: prism([(0, 0), (3, 0), (3, 0.6), (2.6, 1), (1, 1), (1, 3), (0, 3)], 1.0), 3),
     "plate with a hexagonal hole": (lambda: prism([(-2, -2), (2, -2), (2, 2), (-2, 2)], 0.5, ring(6, 0.8)[::-1]), 6),
     "tetrahedron": (lambda: hull((0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)), 4),
