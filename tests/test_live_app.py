@@ -44,18 +44,13 @@ def page(tmp_path_factory):
 
 @contextmanager
 def served(folder):
-    """Port and process of a page; uploads up to 1 MB. Its terminal stays silent, whatever it is asked.
-
-    VTK, which takes half of the time of so short a run, is given no window to draw in; the views of the page and of the
-    report are drawn by the browser.
-    """
+    """Port and process of a page; uploads up to 1 MB. Its terminal stays silent, whatever it is asked."""
     pytest.importorskip("trame")
     environment = os.environ | {
         "PYTHONPATH": str(Path(iga_nn.__file__).parents[1]),
         "TRAME_DEFAULT_HOST": "0.0.0.0",
         "TRAME_ARGS": "--host 0.0.0.0",
         "TMPDIR": str(folder),
-        "VTK_DEFAULT_OPENGL_WINDOW": "none",
     }
     command = [sys.executable, "-m", "iga_nn", "app", "--port", "0", "--max-upload", "1", *QUICK]
     terminal = folder / "stderr"

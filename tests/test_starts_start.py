@@ -7,7 +7,7 @@ import pytest
 from block_starts import torus
 from shapes import rounded_cube
 
-from parameterize.attempts import BLOCKS, STARTS, starts_of
+from parameterize.attempts import BLOCKS, BODY, STARTS, starts_of
 from parameterize.config import preset
 from parameterize.skeleton.choice import Choice
 from parameterize.starts import start
@@ -40,14 +40,10 @@ def test_why_a_body_with_handles_gets_blocks_is_told_and_logged(caplog):
     assert task.seconds["fit"] > 0.0
 
 
-def test_where_no_start_makes_what_was_chosen_that_is_said(monkeypatch):
-    monkeypatch.setattr(start, "choose", lambda _: Choice("body", "1 handle on a fat body: one block"))
+def test_a_fat_body_with_thin_handles_gets_stubs_and_blocks_where_these_fail(monkeypatch):
+    monkeypatch.setattr(start, "choose", lambda _, stubs: Choice("body", "1 handle, a thin one on a fat body"))
     task = task_of(preset("fast"))
-    assert starts_of(task) == (BLOCKS,)
-    assert (
-        task.choice.reason
-        == "1 handle on a fat body: one block, for which there is no start: blocks along the skeleton"
-    )
+    assert starts_of(task) == (BODY, BLOCKS) and task.choice.reason == "1 handle, a thin one on a fat body"
 
 
 def test_a_compact_body_gets_one_cube_without_a_skeleton(monkeypatch, caplog):

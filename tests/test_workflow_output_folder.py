@@ -113,7 +113,7 @@ def test_what_a_training_reported_is_not_replaced_by_a_solve(arguments, formula_
         assert main([*arguments, "out/volume.npz", "--refine", "0", "--out", "other", "--force"]) == 0
 
 
-@pytest.mark.parametrize("other", [["cube", "--seed", "3"], ["ellipsoid"], ["cube", "--steps-factor", "0.5"]])
+@pytest.mark.parametrize("other", [["bean", "--seed", "3"], ["ellipsoid"], ["bean", "--steps-factor", "0.5"]])
 def test_a_checkpoint_of_another_run_is_refused_before_anything_is_computed(
     other, in_folder, short_training, capsys, monkeypatch
 ):
@@ -122,7 +122,7 @@ def test_a_checkpoint_of_another_run_is_refused_before_anything_is_computed(
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        iga_nn.run("poisson", "cube", "out", progress=interrupted)
+        iga_nn.run("poisson", "bean", "out", progress=interrupted)
     before = {file: file.read_bytes() for file in Path("out").rglob("*") if file.is_file()}
     monkeypatch.setattr("parameterize.run.identity_of", identity_of_short)
     monkeypatch.setattr("iga_nn.workflow.mapping.forecast", lambda *_, **__: pytest.fail("too late"))
