@@ -45,6 +45,7 @@ def test_workers_that_never_come_are_not_waited_for_without_end(monkeypatch):
         next(cluster.computed(nobody, [None], WorkerOptions(), lambda *_: None))
 
 
+@pytest.mark.slow
 def test_the_slurm_script_runs_a_batch_on_the_workers_of_a_cluster(in_folder):
     surface = small_surface()
     Path("pillow.obj").write_text(obj(surface.vertices, surface.faces))

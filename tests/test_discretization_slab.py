@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import replace
+from functools import cache
 from types import SimpleNamespace
 
 import numpy as np
@@ -31,25 +32,31 @@ def alone():
 
 
 @pytest.fixture(scope="module")
-def job(tmp_path_factory, request):
-    """The folder of what groups of so many processes have found."""
-    folder = tmp_path_factory.mktemp("job")
-    done = mpiexec(request.param, "mpi_cases.py", folder, cwd=folder)
-    assert done.returncode == 0, done.stdout + done.stderr
-    return folder
+def job(tmp_path_factory):
+    """A function that runs groups of so many processes, once, and returns the folder of what they have found."""
+
+    @cache
+    def run(processes):
+        folder = tmp_path_factory.mktemp("job")
+        done = mpiexec(processes, "mpi_cases.py", folder, cwd=folder)
+        assert done.returncode == 0, done.stdout + done.stderr
+        return folder
+
+    return run
 
 
 JOBS = [(3, 1), (3, 2), (3, 3), *(pytest.param(7, ranks, marks=pytest.mark.slow) for ranks in (1, 2, 4, 7))]
 
 
-@pytest.mark.parametrize(("job", "ranks"), JOBS, indirect=["job"])
-def test_processes_find_the_solution_of_a_single_one(ranks, alone, job):
+@pytest.mark.parametrize(("processes", "ranks"), JOBS)
+def test_processes_find_the_solution_of_a_single_one(processes, ranks, alone, job):
     """Of 3 processes one has no span where u has 2; of 7 some have none where it has 3 or 4."""
-    found = json.loads((job / str(ranks) / "found.json").read_text())
+    folder = job(processes) / str(ranks)
+    found = json.loads((folder / "found.json").read_text())
     assert found.pop("refused") == ranks
     assert found.keys() == alone.keys()
     for name, one in alone.items():
-        many = np.load(job / str(ranks) / f"{name}.npy")
+        many = np.load(folder / f"{name}.npy")
         assert np.abs(many - one.coefficients).max() <= 1e-10 * np.abs(one.coefficients).max(), name
         report = found[name]
         assert report["ranks"] == ranks

@@ -335,6 +335,7 @@ async def with_box(browser, port, path):
     return tab
 
 
+@pytest.mark.slow
 def test_an_elastic_body_is_held_and_loaded_by_clicks(chromium, page, tmp_path):
     asyncio.run(bend(chromium, page, tmp_path))
 

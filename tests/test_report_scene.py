@@ -176,6 +176,7 @@ def test_view_shows_fields_in_the_colours_of_the_bar_and_one_section_at_a_time(c
     assert seen["u"]["colors"] != seen["moved"]["colors"] and min(inside.values()) > 1000
 
 
+@pytest.mark.slow
 def test_mouse_wheel_and_fingers_turn_move_and_enlarge(chromium, solved, tmp_path):
     async def work(browser):
         tab = await opened(browser, solved / "report.html")
@@ -230,7 +231,7 @@ def test_mouse_wheel_and_fingers_turn_move_and_enlarge(chromium, solved, tmp_pat
     assert abs(width["turned"] - width["pinched"]) > 5
 
 
-@pytest.mark.parametrize("width", [390, 1400])
+@pytest.mark.parametrize("width", [390, pytest.param(1400, marks=pytest.mark.slow)])
 def test_pages_fit_the_window(chromium, solved, tmp_path, width):
     report = document.read(solved)
     rows = [Row(Entry("a_part.npz", "a_part.npz", solved), "certified", "", report)]
@@ -326,6 +327,7 @@ def test_a_tap_reads_values_on_a_phone(chromium, tmp_path):
     assert float(read["u"]) == pytest.approx(2 + numbers(read["x, y, z"])[0], abs=1e-3) and width == 390
 
 
+@pytest.mark.slow
 def test_a_page_around_the_view_hears_which_face_is_clicked_and_where(chromium, tmp_path):
     volume = benchmark_volume(1)
     written(tmp_path, scene_of(volume))
@@ -361,6 +363,7 @@ def test_a_plane_of_space_cuts_the_body_in_its_colours(chromium, tmp_path):
     assert sum(count for name, count in seen.items() if near[name]) > 0.9 * sum(seen.values()) > 1000
 
 
+@pytest.mark.slow
 def test_element_lines_are_those_of_the_solutions_mesh(chromium, tmp_path):
     """A cube of 3 x 3 x 3 elements as seen along x: two dark lines cross a row, at a third and at two thirds."""
     volume = benchmark_volume(3, amplitude=0.0)
