@@ -191,12 +191,12 @@ async def seen_by_another_tab(tab, folder):
     await tab.until("document.querySelector('.drawing canvas') !== null", PATIENCE)
     await on_paper(tab, folder / "second.png")
     await tab.sees("Stop")
-    await tab.click("cube")
-    await tab.sees("cube.obj\naccepted", PATIENCE)
+    await tab.click("bean")
+    await tab.sees("bean.obj\naccepted", PATIENCE)
     await tab.click("Start")
     await tab.sees("waiting, 1 job ahead; one job runs at a time", PATIENCE)
     await tab.click("Remove")
-    await tab.sees("cube.obj\naccepted")
+    await tab.sees("bean.obj\naccepted")
 
 
 async def trained(tab, folder):
@@ -233,7 +233,7 @@ async def kept(tab):
     """A reload keeps the job and what was typed, also into the form of a job that was left."""
     await tab.click("3 · my ball.obj\ndone")
     await tab.value(TYPED % ("source", "x*"))
-    await tab.click("4 · cube.obj\nstopped")
+    await tab.click("4 · bean.obj\nstopped")
     await tab.sees("Resume continues")
     await tab.click("3 · my ball.obj\ndone")
     await tab.value(RELOADED)
@@ -247,16 +247,16 @@ async def kept(tab):
 async def deleted(tab, other):
     """A job is deleted where that is confirmed; the tab that showed it says so."""
     for one in (tab, other):
-        await one.click("4 · cube.obj\nstopped")
+        await one.click("4 · bean.obj\nstopped")
         await one.sees("Resume continues")
     await tab.click("Delete")
     await tab.click("Keep it")
     await tab.click("Delete")
-    assert "cube.obj" in await other.text()
+    assert "bean.obj" in await other.text()
     await tab.click("Yes, delete")
     await other.sees("Job 4, which this tab showed, was deleted.")
     for one in (tab, other):
-        await one.until("!document.body.innerText.includes('cube.obj')")
+        await one.until("!document.body.innerText.includes('bean.obj')")
 
 
 async def shows_faces(tab, path, seconds=30.0):
