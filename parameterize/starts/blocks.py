@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..arrays import Array
+from ..arrays import Array, Knots
 from ..blocks.layout import Block, BlockLayout, LayoutError
 from ..checkpoint import Checkpoints
 from ..config import Config, scaled_steps
@@ -101,16 +101,20 @@ def schedule(
 
 def thin_blocks(layout: BlockLayout, degree: int) -> SplineMap:
     """Return the map whose control points are points of the layout's rods, at the Greville points of uniform knots."""
-    knots = [tuple(open_uniform_knots(degree + spans, degree) for spans in block.spans) for block in layout.blocks]
-    nets = Nets(degree, tuple(knots), layout.interfaces)  # type: ignore[arg-type]
-    pairs = zip(layout.blocks, knots, strict=True)
-    points = [_points(block, [greville(row, degree) for row in rows]) for block, rows in pairs]
+    nets = nets_of(layout, degree)
+    points = [points_of(block, rows, degree) for block, rows in zip(layout.blocks, nets.knots, strict=True)]
     return SplineMap(nets, nets.merged(nets.joined(points)))
 
 
-def _points(block: Block, rows: list[Array]) -> Array:
-    """Return the points (3, n_u, n_v, n_w) of a rod on a grid of parameters."""
-    places = np.stack(np.meshgrid(*rows, indexing="ij"), axis=-1)
+def nets_of(layout: BlockLayout, degree: int) -> Nets:
+    """Return the control nets of a layout's blocks, with uniform knots."""
+    knots = [tuple(open_uniform_knots(degree + spans, degree) for spans in block.spans) for block in layout.blocks]
+    return Nets(degree, tuple(knots), layout.interfaces)  # type: ignore[arg-type]
+
+
+def points_of(block: Block, knots: Knots, degree: int) -> Array:
+    """Return the points (3, n_u, n_v, n_w) of a block at the Greville points of its knots."""
+    places = np.stack(np.meshgrid(*(greville(row, degree) for row in knots), indexing="ij"), axis=-1)
     return np.moveaxis(block.points(places), -1, 0)
 
 

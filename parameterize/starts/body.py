@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ..arrays import Array, IntArray
+from ..arrays import Array, IntArray, Knots
 from ..blocks.inside import Body
 from ..blocks.layout import BlockLayout, LayoutError
 from ..blocks.room import Room
@@ -19,14 +19,13 @@ from ..handles.cutting import without_handles
 from ..handles.layout import Footprint, footprint, stub_layout
 from ..optimization.reassignment import boundary_samples
 from ..progress import timed
-from ..spline.bspline import greville, open_uniform_knots
+from ..spline.bspline import greville
 from ..spline.interface import face_layer
-from ..spline.nets import Nets
 from ..spline.spline_map import SplineMap
 from ..spline.volume import BSplineVolume
 from ..surface.surface import surface_from_arrays
 from ..threads import one_blas_thread
-from .blocks import schedule, softened, surface_fit
+from .blocks import nets_of, points_of, schedule, softened, surface_fit
 from .growth import GROWTH, STIFF
 from .start import MOST_POINTS, Attempt, Start, Task, optimized
 
@@ -45,7 +44,8 @@ class WithStubs(Start):
     def make(self, task: Task, checkpoints: Checkpoints) -> Attempt | None:
         """Map the body without its handles, lay rods for these, and return the attempt with all blocks.
 
-        None is returned where they do not leave one body without handles, or no rods fit.
+        None is returned where they do not leave one body without handles, no rods fit, or more blocks would be needed
+        than the options allow.
         """
         surface = task.surface
         with timed(task.seconds, "fit"), one_blas_thread():
@@ -59,10 +59,13 @@ class WithStubs(Start):
             ends = [(_footprint(body, first), _footprint(body, last)) for first, last in rims]
             room = Room(task.skeleton, Body(surface.unit_vertices, surface.faces))
             try:
-                first = _first(*stub_layout(body.volume, ends, handles, room), task.config.spline.degree)
+                layout, parts = stub_layout(body.volume, ends, handles, room)
             except LayoutError as error:
                 _log.warning("%s", error)
                 return None
+            if len(layout) > (task.config.blocks or len(layout)):
+                return None
+            first = _first(layout, parts, task.config.spline.degree)
             fit = surface_fit(task, first)
         rounds = schedule(task.config, _FACE_SHARES, _POINT_SHARES)
         return softened(optimized(first, fit, rounds, task, checkpoints, STIFF.weights), task, checkpoints)
@@ -89,26 +92,21 @@ def _footprint(body: SplineMap, rim: Array) -> Footprint:
 
 def _first(layout: BlockLayout, parts: tuple[BSplineVolume, ...], degree: int) -> SplineMap:
     """Return the map of all blocks: rods whose ends lie on the body, and the parts of the body's map."""
-    count = len(layout.blocks) - len(parts)
-    rods = layout.blocks[:count]
-    knots = [tuple(open_uniform_knots(degree + spans, degree) for spans in block.spans) for block in layout.blocks]
-    nets = Nets(degree, tuple(knots), layout.interfaces)  # type: ignore[arg-type]
-    points = [_on_body(number, layout, knots[number], parts, degree) for number in range(len(rods))]
+    nets, count = nets_of(layout, degree), len(layout) - len(parts)
+    points = [_on_body(number, layout, nets.knots[number], parts, degree) for number in range(count)]
     points += [part.control_points for part in parts]
     return SplineMap(nets, nets.merged(nets.joined([np.moveaxis(net, -1, 0) for net in points])))
 
 
-def _on_body(
-    number: int, layout: BlockLayout, rows: tuple[Array, ...], parts: tuple[BSplineVolume, ...], degree: int
-) -> Array:
+def _on_body(number: int, layout: BlockLayout, knots: Knots, parts: tuple[BSplineVolume, ...], degree: int) -> Array:
     """Return the control points (n_u, n_v, n_w, 3) of a rod whose ends are the faces of the body's blocks below."""
-    places = [greville(row, degree) for row in rows]
-    points = layout.blocks[number].points(np.stack(np.meshgrid(*places, indexing="ij"), axis=-1))
+    along = greville(knots[2], degree)
+    points = np.moveaxis(points_of(layout.blocks[number], knots, degree), 0, -1)
     for interface in layout.interfaces:
         (own, face), (other, below) = interface.first, interface.second
         if own == number:
-            body = parts[other - len(layout.blocks) + len(parts)].control_points
+            body = parts[other - len(layout) + len(parts)].control_points
             away = interface.turned(face_layer(body, below)) - face_layer(points, face)
-            share = np.maximum(0.0, 1.0 - 2.0 * (places[2] if face == "w0" else 1.0 - places[2]))
+            share = np.maximum(0.0, 1.0 - 2.0 * (along if face == "w0" else 1.0 - along))
             points = points + share[:, None] * away[:, :, None]
     return points
