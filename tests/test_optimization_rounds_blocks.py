@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from functools import cache
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,8 +14,10 @@ from parameterize.certificate.body import certify
 from parameterize.certificate.boundary import check_boundary
 from parameterize.checkpoint import Checkpoints
 from parameterize.config import SplineConfig
+from parameterize.optimization.energy import SplineEnergy
 from parameterize.optimization.phases import Polish, Schedule, Separate, Shape, Unfold
 from parameterize.optimization.rounds import optimize
+from parameterize.optimization.term import Weights
 from parameterize.progress import History
 from parameterize.spline.multipatch import MultiPatch
 
@@ -62,6 +65,19 @@ def test_a_double_torus_with_a_junction_is_certified_and_close():
     found, _, _, distance = optimised(map_of(BlockLayout.from_blocks(blocks)), points, faces, schedule, steps=8)
     demand_certified(found)
     assert distance < 2e-3
+
+
+def test_the_edges_of_blocks_are_drawn_out_where_the_boundary_meets_itself():
+    start, points, faces = torus_start()
+    energy = SplineEnergy(start.nets, surface_fit(start, points, faces), Weights())
+    places = energy.surface.places
+    far = np.roll(places.parameters, len(points) // 2, axis=0), np.roll(places.cube_faces, len(points) // 2)
+    places.place(*far)
+    assert energy.anchors.energy_and_gradient(start.control)[0] == 0.0
+    misplaced = np.linalg.norm(energy.surface.residuals(start.control), axis=1)
+    Separate().begin(SimpleNamespace(energy=energy, spline=start, near=False, number=9))  # type: ignore[arg-type]
+    assert energy.anchors.energy_and_gradient(start.control)[0] > 0.0
+    assert np.linalg.norm(energy.surface.residuals(start.control), axis=1).max() < 0.2 * misplaced.max()
 
 
 def test_the_number_of_threads_changes_no_bit(monkeypatch):

@@ -16,6 +16,7 @@ import numpy as np
 from .endings import Reason
 from .newton import GAIN
 from .optimized import Optimized
+from .reassignment import reassign
 from .spans import acting_on, with_neighbours
 from .state import MOST_WATCHED, State
 
@@ -128,6 +129,9 @@ class Unfold(Phase):
 class Separate(Phase):
     """Push apart the boundary of a certified map that meets itself; the surface's data give way there.
 
+    Where two rods leave a junction at a small angle, their common edge tends to stay behind inside of the solid, and
+    the sheets beside it overlap: anchors draw the edge out, and the surface's points leave their places on the sheets.
+
     far: a root mean square distance from the surface, beyond which the phase gives up.
     """
 
@@ -136,9 +140,13 @@ class Separate(Phase):
     far: float = 0.01
 
     def begin(self, state: State) -> None:
-        """Let the surface's data give way where sheets of the boundary touch."""
-        state.energy.give_way(state.energy.watch_contact(state.spline.control), _CONTACT_WAY)
+        """Let the surface's data give way where sheets of the boundary touch; with several blocks, place them anew."""
+        energy, control = state.energy, state.spline.control
+        energy.give_way(energy.watch_contact(control), _CONTACT_WAY)
         super().begin(state)
+        if not energy.nets.one_cube:
+            energy.anchors.aim(control, hold=True)
+            reassign(energy.surface, control, first=True)
 
     def done(self, state: State) -> Reason | None:
         """Return a reason to end when the boundary no longer meets itself, or cannot be parted near the surface."""
