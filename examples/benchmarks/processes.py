@@ -24,7 +24,7 @@ from parameterize.threads import default_threads
 BAD_INPUT, INTERRUPTED = 2, 130
 THREADS = "threads.txt"  # in the folder of a surface whose seconds were measured
 STAGES = ("train", "fit", "optimize", "refine", "certify")
-PHASES = ("grow", "shape", "unfold", "separate", "polish")  # of a spline stage, the columns of MapColumns
+PHASES = ("approach", "grow", "shape", "unfold", "separate", "polish")  # of a spline stage, the columns of MapColumns
 
 
 class OneLineParser(argparse.ArgumentParser):
@@ -94,11 +94,13 @@ class MapColumns:
 
     origin: str | None = None  # where the map comes from
     attempts: str | None = None  # the starts that were tried
+    rounds_approach: int | None = None
     rounds_grow: int | None = None
     rounds_shape: int | None = None
     rounds_unfold: int | None = None
     rounds_separate: int | None = None
     rounds_polish: int | None = None
+    seconds_approach: float | None = None
     seconds_grow: float | None = None
     seconds_shape: float | None = None
     seconds_unfold: float | None = None
