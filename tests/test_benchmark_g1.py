@@ -37,11 +37,13 @@ DUCK = g1.Row(
     seconds=120.0,
     origin="growth",
     attempts="network, growth",
+    rounds_approach=0,
     rounds_grow=11,
     rounds_shape=0,
     rounds_unfold=3,
     rounds_separate=0,
     rounds_polish=2,
+    seconds_approach=0.0,
     seconds_grow=20.0,
     seconds_shape=0.0,
     seconds_unfold=30.0,
@@ -89,7 +91,7 @@ def test_figures_at_or_below_the_papers_are_bold_at_the_papers_scale(tmp_path):
     assert cells(text, "duck")[1:] == [
         ["duck", "0.000567", "0.00891", "0.00123", "", "", "", "2"],
         ["duck", "30 x 30 x 30", "120.0", "", "", "", "", ""],
-        ["duck", "growth", "network, growth", "11 / 20.0", "", "3 / 30.0", "", "2 / 10.0"],
+        ["duck", "growth", "network, growth", "", "11 / 20.0", "", "3 / 30.0", "", "2 / 10.0"],
         ["duck", "", "", "", "", "2.50e-05", "", "21"],
     ]
 

@@ -10,6 +10,7 @@ import pytest
 from example_files import cells, load
 
 from iga_nn.options import MapOptions
+from parameterize.optimization.phases import Phase
 
 stress = load("benchmarks/stress")
 shapes = stress.compute_shape.__globals__
@@ -33,11 +34,13 @@ ROW = stress.Row(
     seconds=100.0,
     origin="growth",
     attempts="network, growth",
+    rounds_approach=0,
     rounds_grow=11,
     rounds_shape=0,
     rounds_unfold=3,
     rounds_separate=0,
     rounds_polish=2,
+    seconds_approach=0.0,
     seconds_grow=20.0,
     seconds_shape=0.0,
     seconds_unfold=30.0,
@@ -111,7 +114,7 @@ def test_the_table_gives_shares_by_kind_and_lists_what_failed(tmp_path):
     rows = [folded, ROW, replace(ROW, number=1, arap_mean=3.0), overlapping, lost]
     text = stress.as_text(rows, options(tmp_path, numbers=(1, 2, 7, 8, 13, 14)))
     assert cells(text, "bent")[0][2:] == ["3", "2", "67 %", "2.50", "0.00200", "0.00050", "100", "100"]
-    assert cells(text, "bent")[1][1:] == ["growth 2", "2.0", "11.0 / 20.0", "", "3.0 / 30.0", "", "2.0 / 10.0"]
+    assert cells(text, "bent")[1][1:] == ["growth 2", "2.0", "", "11.0 / 20.0", "", "3.0 / 30.0", "", "2.0 / 10.0"]
     assert cells(text, "spiky")[0][2:5] == ["2", "0", "0 %"]
     assert cells(text, "008-spiky")[0][1:6] == ["folded", "12", "2000", "4.00", "100"]
     assert cells(text, "002-spiky")[0][1] == "certified, meets itself"
@@ -173,3 +176,13 @@ def test_bad_arguments_are_one_line(tmp_path, capsys):
         with pytest.raises(SystemExit) as stop:
             stress.main([*given, "--out", str(tmp_path)])
         assert stop.value.code == 2 and word in capsys.readouterr().err
+
+
+def test_every_phase_has_its_columns():
+    def below(kind):
+        return {kind, *(one for own in kind.__subclasses__() for one in below(own))}
+
+    names = {kind.name for kind in below(Phase) if hasattr(kind, "name") and kind.__module__.startswith("parameterize")}
+    assert set(stress.processes.PHASES) == names and "approach" in names
+    columns = stress.processes.columns_of(stress.Row)
+    assert all(f"{what}_{name}" in columns for what in ("rounds", "seconds") for name in names)

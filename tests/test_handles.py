@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from thick_bodies import implicit, plate, ring
+from thick_bodies import BALL, eared, plate
 
 from parameterize.blocks.inside import Body
 from parameterize.blocks.room import Room
@@ -17,19 +17,10 @@ from parameterize.surface.geometry import signed_volume
 from parameterize.surface.topology import genus_of
 from parameterize.training.samples import interior_points
 
-BALL = 0.9  # of the bodies below
-THIN = 0.13
-
-
-def eared(x):
-    """A ball with a thin handle, or ear, on either side."""
-    ears = (ring(np.array([x[0] - side, x[1], x[2]]), 0.0, 0.4, THIN) for side in (-1.0, 1.0))
-    return np.minimum(np.linalg.norm(x, axis=0) - BALL, np.minimum(*ears))
-
 
 @pytest.fixture(scope="module")
 def body():
-    vertices, faces, genus = implicit(eared, (1.7, 1.1, 1.1), 64)
+    vertices, faces, genus = eared()
     skeleton = skeleton_of(vertices, faces, genus)
     return vertices, faces, skeleton, handles_of(skeleton, interior_points(vertices, faces, 0.03))
 

@@ -185,8 +185,7 @@ def _options(argv: list[str] | None) -> Options:
     )
     if unknown:
         parser.error(f"--only {' '.join(unknown)}: no such model; the models are {', '.join(PAPER)}")
-    if given.jobs < 1:
-        parser.error(f"--jobs {given.jobs}: must be at least 1")
+    processes.demand_positive(parser, given, "jobs")
     if not given.models.is_dir():
         parser.error(f"{given.models}: no such folder; name the models' with --models or {DATA_FOLDER}")
     try:
@@ -197,7 +196,7 @@ def _options(argv: list[str] | None) -> Options:
     return Options(given.models, names, mapping, given.jobs, given.out)
 
 
-def _parser() -> argparse.ArgumentParser:
+def _parser() -> processes.OneLineParser:
     parser = processes.OneLineParser(
         prog="g1.py", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )

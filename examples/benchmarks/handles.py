@@ -12,7 +12,6 @@ row, which says why; the knotted tunnel is to be refused.
 
 from __future__ import annotations
 
-import argparse
 import os
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
@@ -26,7 +25,6 @@ import processes
 from iga_nn.batch.table import Batch
 from iga_nn.batch.table import Row as Known
 from iga_nn.batch.task import Task
-from iga_nn.errors import InputError
 from iga_nn.level_table import csv_text
 from iga_nn.models import DATA_FOLDER
 from iga_nn.options import MapOptions, WorkerOptions
@@ -150,8 +148,7 @@ def _options(argv: list[str] | None) -> Options:
     parser = _parser()
     given = parser.parse_args(argv)
     mapping = MapOptions(device="cpu", blocks=given.blocks, steps_factor=given.steps_factor, resume=True)
-    if given.jobs < 1:
-        parser.error(f"--jobs {given.jobs}: must be at least 1")
+    processes.demand_positive(parser, given, "jobs")
     lists = given.lists or ([] if given.files else list(MADE))
     surfaces = _named(lists, given.files, given.models, given.out)
     names = [surface.name for surface in surfaces]
@@ -159,30 +156,19 @@ def _options(argv: list[str] | None) -> Options:
         parser.error(f"{', '.join(twice)}: two surfaces have this name; rename the file, or run it alone")
     if unknown := sorted(set(given.only) - set(names)):
         parser.error(f"--only {' '.join(unknown)}: no such surface; there are {', '.join(names)}")
-    try:
-        mapping.config()
-        (given.out / "surfaces").mkdir(parents=True, exist_ok=True)
-    except InputError as error:
-        parser.error(str(error))
-    except OSError as error:
-        parser.error(f"{given.out}: cannot be written ({error.strerror}); --out names another folder")
+    processes.demand_runnable(parser, mapping, given.out)
     chosen = tuple(surface for surface in surfaces if not given.only or surface.name in given.only)
     return Options(chosen, mapping, given.jobs, given.out)
 
 
-def _parser() -> argparse.ArgumentParser:
-    parser = processes.OneLineParser(
-        prog="handles.py", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+def _parser() -> processes.OneLineParser:
+    parser = processes.parser_of_surfaces("handles.py", __doc__, Path("out/handles"))
     models = Path(os.environ.get(DATA_FOLDER) or REPOSITORY.parent / "shared" / "models")
     parser.add_argument("--lists", nargs="+", default=[], choices=list(MADE), help="of these alone (default: all)")
     parser.add_argument("--only", nargs="+", default=[], metavar="NAME", help="these surfaces alone")
     parser.add_argument("--files", nargs="+", default=[], type=Path, metavar="FILE", help="these files instead")
     parser.add_argument("--models", type=Path, default=models, help=f"folder of the models (default: {models})")
     parser.add_argument("--blocks", type=_blocks, default="auto", help='at most so many, or "auto" (default: auto)')
-    parser.add_argument("--jobs", type=int, default=1, help="surfaces at a time (default: 1)")
-    parser.add_argument("--out", type=Path, default=Path("out/handles"), help="folder (default: out/handles)")
-    parser.add_argument("--steps-factor", type=float, default=1.0, help="shorten every stage, for a quick look")
     return parser
 
 

@@ -15,7 +15,7 @@ from iga_nn.batch.run_batch import Running, run_tasks
 from iga_nn.batch.table import Batch, Row
 from iga_nn.batch.task import Task, compute
 from iga_nn.errors import InputError
-from iga_nn.options import WorkerOptions
+from iga_nn.options import MapOptions, WorkerOptions
 from iga_nn.workflow.output_folder import has_checkpoint
 from iga_nn.workflow.worker_run import Ended
 from parameterize.files import save_text
@@ -24,7 +24,7 @@ from parameterize.threads import default_threads
 BAD_INPUT, INTERRUPTED = 2, 130
 THREADS = "threads.txt"  # in the folder of a surface whose seconds were measured
 STAGES = ("train", "fit", "optimize", "refine", "certify")
-PHASES = ("grow", "shape", "unfold", "separate", "polish")  # of a spline stage, the columns of MapColumns
+PHASES = ("approach", "grow", "shape", "unfold", "separate", "polish")  # of a spline stage, the columns of MapColumns
 
 
 class OneLineParser(argparse.ArgumentParser):
@@ -33,6 +33,33 @@ class OneLineParser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
         """Exit code 2."""
         self.exit(BAD_INPUT, f"{self.prog}: {message}\n")
+
+
+def parser_of_surfaces(prog: str, description: str, out: Path) -> OneLineParser:
+    """A parser with the options of every benchmark that runs surfaces; out: the folder of its results."""
+    parser = OneLineParser(prog=prog, description=description, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--jobs", type=int, default=1, help="surfaces at a time (default: 1)")
+    parser.add_argument("--out", type=Path, default=out, help=f"folder (default: {out})")
+    parser.add_argument("--steps-factor", type=float, default=1.0, help="shorten every stage, for a quick look")
+    return parser
+
+
+def demand_positive(parser: OneLineParser, given: argparse.Namespace, *names: str) -> None:
+    """Refuse options that count something and are less than 1."""
+    for name in names:
+        if getattr(given, name) < 1:
+            parser.error(f"--{name} {getattr(given, name)}: must be at least 1")
+
+
+def demand_runnable(parser: OneLineParser, mapping: MapOptions, out: Path) -> None:
+    """Refuse options of the map that cannot be, and a folder that cannot be written, where made surfaces go."""
+    try:
+        mapping.config()
+        (out / "surfaces").mkdir(parents=True, exist_ok=True)
+    except InputError as error:
+        parser.error(str(error))
+    except OSError as error:
+        parser.error(f"{out}: cannot be written ({error.strerror}); --out names another folder")
 
 
 def cores() -> int:
@@ -67,11 +94,13 @@ class MapColumns:
 
     origin: str | None = None  # where the map comes from
     attempts: str | None = None  # the starts that were tried
+    rounds_approach: int | None = None
     rounds_grow: int | None = None
     rounds_shape: int | None = None
     rounds_unfold: int | None = None
     rounds_separate: int | None = None
     rounds_polish: int | None = None
+    seconds_approach: float | None = None
     seconds_grow: float | None = None
     seconds_shape: float | None = None
     seconds_unfold: float | None = None

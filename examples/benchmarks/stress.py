@@ -11,7 +11,6 @@ a surface's mesh is in surfaces/, and report.html in its folder shows where it i
 
 from __future__ import annotations
 
-import argparse
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
@@ -24,7 +23,6 @@ from hard_shapes import KINDS, LATER, compute_shape, kind_of, name_of
 from iga_nn.batch.table import Batch
 from iga_nn.batch.table import Row as Known
 from iga_nn.batch.task import Task
-from iga_nn.errors import InputError
 from iga_nn.level_table import csv_text
 from iga_nn.options import MapOptions, WorkerOptions
 from iga_nn.report import document as reports
@@ -123,16 +121,8 @@ def _options(argv: list[str] | None) -> Options:
     mapping = MapOptions(
         device="cpu", control_points=given.control_points, steps_factor=given.steps_factor, resume=True
     )
-    for name in ("count", "jobs"):
-        if getattr(given, name) < 1:
-            parser.error(f"--{name} {getattr(given, name)}: must be at least 1")
-    try:
-        mapping.config()
-        (given.out / "surfaces").mkdir(parents=True, exist_ok=True)
-    except InputError as error:
-        parser.error(str(error))
-    except OSError as error:
-        parser.error(f"{given.out}: cannot be written ({error.strerror}); --out names another folder")
+    processes.demand_positive(parser, given, "count", "jobs")
+    processes.demand_runnable(parser, mapping, given.out)
     if given.first < 0:
         parser.error(f"--first {given.first}: must not be negative")
     numbers = tuple(
@@ -144,16 +134,11 @@ def _options(argv: list[str] | None) -> Options:
     return Options(numbers, mapping, given.jobs, given.out)
 
 
-def _parser() -> argparse.ArgumentParser:
-    parser = processes.OneLineParser(
-        prog="stress.py", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+def _parser() -> processes.OneLineParser:
+    parser = processes.parser_of_surfaces("stress.py", __doc__, Path("out/stress"))
     parser.add_argument("--first", type=int, default=0, help="number of the first surface (default: 0)")
     parser.add_argument("--count", type=int, default=200, help="so many from there on (default: 200)")
     parser.add_argument("--kinds", nargs="+", default=KINDS, choices=KINDS, help="of these alone")
-    parser.add_argument("--jobs", type=int, default=1, help="surfaces at a time (default: 1)")
-    parser.add_argument("--out", type=Path, default=Path("out/stress"), help="folder (default: out/stress)")
-    parser.add_argument("--steps-factor", type=float, default=1.0, help="shorten every stage, for a quick look")
     parser.add_argument("--control-points", type=int, default=30, help="per direction (default: 30)")
     return parser
 

@@ -4,7 +4,7 @@ import numpy as np
 
 from ..arrays import Array, Mask
 from ..skeleton.graph import Branch, Skeleton
-from ..spline.interface import axis_side, face_layer
+from ..spline.interface import face_layer, outward
 from .checks import folded
 from .frames import at_lengths
 from .inside import Body
@@ -158,9 +158,7 @@ class Draft:
         if node not in self.junctions:
             return None
         name = self.junctions[node].exits[number, end].face
-        axis, side = axis_side(name)
-        corners = face_layer(self.corners(node), name)
-        return corners if bool(side) != (axis == 1) else corners.swapaxes(0, 1)
+        return outward(face_layer(self.corners(node), name), name)
 
 
 def _is_near(point: Array, centers: Array, sections: Array) -> Mask:

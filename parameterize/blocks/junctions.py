@@ -13,9 +13,8 @@ from .assignment import NORMALS
 from .frames import arc_lengths, rotated, tangents
 from .room import Room
 from .splitting import End, junction_at, stub
+from .widths import FLAT, THIN
 
-_THIN = 0.55  # of the way to the surface: half the width of a junction's block
-_FLAT = 4.0  # radii of the node: no side of a block is taken for farther away, as along a plate it would be
 _SHARE = 0.35  # of a branch, at most: what a junction takes at each of its ends
 _CORNERS = 2.0 * np.array(list(np.ndindex(2, 2, 2))) - 1.0  # (8, 3), -1 or 1
 
@@ -75,14 +74,14 @@ def junction(skeleton: Skeleton, node: int, room: Room, size: float) -> Junction
     ends, found = junction_at(skeleton, node)
     center, radius = skeleton.nodes[node], float(skeleton.radii[node])
     free = np.setdiff1d(np.arange(len(NORMALS)), found.faces)
-    reach = np.full(len(NORMALS), _FLAT * radius)
+    reach = np.full(len(NORMALS), FLAT * radius)
     ways = NORMALS[free] @ found.axes
     reach[free] = np.minimum(
         room.body.rays(center, ways), np.maximum(reach[free], room.rays(np.tile(center, (len(ways), 1)), ways))
     )
     for (i, _), face in zip(ends, found.faces, strict=True):
-        reach[face] = min(reach[face], _SHARE / _THIN * skeleton.branches[i].length)
-    half = size * _THIN * reach.reshape(3, 2).min(axis=1)
+        reach[face] = min(reach[face], _SHARE / THIN * skeleton.branches[i].length)
+    half = size * THIN * reach.reshape(3, 2).min(axis=1)
     exits = {
         end: _exit(stub(skeleton.branches[end[0]], end[1]), FACE_NAMES[face], center, float(half[face // 2]))
         for end, face in zip(ends, found.faces.tolist(), strict=True)

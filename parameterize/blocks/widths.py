@@ -6,9 +6,9 @@ from ..arrays import Array
 from .frames import unit
 from .room import Room
 
-THIN = 0.55  # of the way to the surface: half the width of a section
+THIN = 0.55  # of the way to the surface: half the width of a section, and of a junction's block
 _CORNER = 0.8  # of the way to the surface: where a section's corners lie at most
-_FLAT = 4.0  # times the shorter way: so far a section reaches also where another branch is nearer
+FLAT = 4.0  # times the shorter way to the surface: so far blocks reach also where another branch is nearer
 _NARROWER = 0.85  # a factor of the longer side of a section whose corners lie too near the surface
 _TRIES = 30  # of it: a section a hundred times as wide as thick becomes square
 _BEND = 0.6  # of the radius of curvature: half the width at most, or sections would meet at the centre of a bend
@@ -25,7 +25,7 @@ def half_widths(points: Array, across: Array, beside: Array, curvature: Array, r
     ways, own = (
         np.minimum(rays(points[:, None], axes), rays(points[:, None], -axes)) for rays in (room.body.rays, room.rays)
     )
-    half = THIN * np.minimum(ways, np.maximum(own, _FLAT * ways.min(axis=1, keepdims=True)))
+    half = THIN * np.minimum(ways, np.maximum(own, FLAT * ways.min(axis=1, keepdims=True)))
     bends = np.abs(np.einsum("kda,ka->kd", axes, curvature))
     half = np.minimum(half, _BEND / np.maximum(bends, 1e-12))
     half = _corners_inside(points, axes, half, room)

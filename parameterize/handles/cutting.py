@@ -30,9 +30,7 @@ def without_handles(
     rims: list[list[Array]] = [[] for _ in handles]
     kept = faces[~cut]
     for loop in boundary_loops(points, kept):
-        found = owner[loop][owner[loop] >= 0]
-        if len(found):
-            rims[int(np.bincount(found).argmax())].append(points[loop])
+        rims[int(np.bincount(owner[loop]).argmax())].append(points[loop])  # a vertex of what is cut off has an owner
         added, filling = fill(points, kept, loop)
         points, kept = np.concatenate([points, added]), np.concatenate([kept, filling])
     if any(len(ends) != 2 for ends in rims) or genus_of(kept) != 0:
@@ -44,12 +42,12 @@ def without_handles(
 def _owners(points: Array, skeleton: Skeleton, handles: tuple[Handle, ...]) -> IntArray:
     """Return the number of the handle that each point (n, 3) of the surface belongs to, -1 for the body."""
     curves = [branch.points for branch in skeleton.branches]
-    of_body = np.asarray(cKDTree(np.concatenate(curves)).query(points)[0])
+    least = np.asarray(cKDTree(np.concatenate(curves)).query(points)[0])
     owner = np.full(len(points), -1)
     for number, handle in enumerate(handles):
         inner = handle.curve[1:-1]
         distance, place = cKDTree(handle.curve).query(points)
-        own = (distance <= of_body) & (distance <= _WIDE * handle.radius)
+        own = (distance <= least) & (distance <= _WIDE * handle.radius)
         owner[own & (np.asarray(place) > 0) & (np.asarray(place) <= len(inner))] = number
     return owner
 

@@ -11,7 +11,7 @@ from ..blocks.layout import BlockLayout, LayoutError
 from ..blocks.rods import ends_turned, rod
 from ..blocks.room import Room
 from ..spline.bspline import breakpoints
-from ..spline.interface import axis_side
+from ..spline.interface import outward
 from ..spline.volume import FACE_NAMES, BSplineVolume
 from .pieces import Handle
 
@@ -61,13 +61,13 @@ def stub_layout(
     """
     ends_of_spans = breakpoints(volume.knots[0])
     spans = len(ends_of_spans) - 1
-    starts = [_apart([one.first[one.axes.index(axis)] for pair in ends for one in pair if axis in one.axes], spans)
-              for axis in range(3)]  # fmt: skip
+    feet = [one for pair in ends for one in pair]
+    starts = [_apart([one.first[one.axes.index(axis)] for one in feet if axis in one.axes]) for axis in range(3)]
     cuts = [sorted({0, spans, *row, *(first + ACROSS for first in row)}) for row in starts]
     parts = volume.divided(*(ends_of_spans[row[1:-1]] for row in cuts))  # type: ignore[arg-type]
     cells = np.ndindex(*(len(row) - 1 for row in cuts))
     pieces = {cell: _piece(cell, part) for cell, part in zip(cells, parts, strict=True)}
-    faces = [_face(one, starts, cuts, pieces) for pair in ends for one in pair]
+    faces = [_face(one, starts, cuts, pieces) for one in feet]
     if len({face.tobytes() for face in faces}) < len(faces):
         raise LayoutError("handles leave the body at nearly the same place: no stubs fit beside each other there")
     rods = []
@@ -76,7 +76,7 @@ def stub_layout(
     return BlockLayout.from_blocks([*rods, *pieces.values()]), parts
 
 
-def _apart(firsts: list[int], spans: int) -> list[int]:
+def _apart(firsts: list[int]) -> list[int]:
     """Return where intervals begin that do not overlap: of those that do, one takes the place of all."""
     groups: list[list[int]] = []
     for first in sorted(firsts):
@@ -84,7 +84,7 @@ def _apart(firsts: list[int], spans: int) -> list[int]:
             groups[-1].append(first)
         else:
             groups.append([first])
-    return [min(round(float(np.mean(group))), spans - 1 - ACROSS) for group in groups]
+    return [round(float(np.mean(group))) for group in groups]
 
 
 def _piece(cell: tuple[int, ...], part: BSplineVolume) -> Block:
@@ -98,13 +98,13 @@ def _face(
     one: Footprint, starts: list[list[int]], cuts: list[list[int]], pieces: dict[tuple[int, ...], Block]
 ) -> Array:
     """Return the corners (2, 2, 3) of the block's face below a stub, right-handed with its outward normal."""
-    axis, side = axis_side(FACE_NAMES[one.face])
+    axis, side = divmod(one.face, 2)
     cell = [0, 0, 0]
     cell[axis] = len(cuts[axis]) - 2 if side else 0
     for first, own in zip(one.first, one.axes, strict=True):
         cell[own] = cuts[own].index(min(starts[own], key=lambda start: abs(start - first)))
-    face = pieces[cell[0], cell[1], cell[2]].face(FACE_NAMES[one.face])
-    return face if bool(side) != (axis == 1) else face.swapaxes(0, 1)
+    name = FACE_NAMES[one.face]
+    return outward(pieces[cell[0], cell[1], cell[2]].face(name), name)
 
 
 def _rod(name: str, handle: Handle, first: Array, last: Array, room: Room) -> Block:

@@ -43,7 +43,7 @@ def handles_of(skeleton: Skeleton, inside: Array) -> tuple[Handle, ...]:
     left = list(range(len(pieces)))
     for k in sorted(left, key=lambda k: -_slenderness(pieces[k])):
         piece = pieces[k]
-        if piece is not None and _is_loop(skeleton, [one for one in left if one != k]):
+        if piece is not None and _connected_by(skeleton, [one for one in left if one != k]):
             left.remove(k)
             chosen.append(piece)
     return tuple(chosen) if len(chosen) == skeleton.handles else ()
@@ -79,7 +79,7 @@ def _runs(mask: Mask) -> IntArray:
     return np.stack([np.flatnonzero(edges == 1), np.flatnonzero(edges == -1) - 1], axis=1)
 
 
-def _is_loop(skeleton: Skeleton, branches: list[int]) -> bool:
+def _connected_by(skeleton: Skeleton, branches: list[int]) -> bool:
     """Return whether the nodes stay connected by these branches alone."""
     piece = np.arange(len(skeleton.nodes))
     for k in branches:

@@ -37,7 +37,7 @@ class Sharpness:
         Of all sharp edges, in the user's units.
     distance : Distances or None
         From samples on these to the nearest edge of an outer face of F, over the diagonal of the surface's bounding
-        box; None where there are none.
+        box; rms and mean over their length. None where there are none.
     normals : Distances
         Angles in degrees between the normals of F's boundary and of the nearest triangle of the surface; rms and mean
         over the area.
@@ -60,19 +60,23 @@ def sharpness_of(body: BSplineVolume | MultiPatch, vertices: Array, faces: IntAr
     diagonal = float(np.linalg.norm(np.ptp(vertices, axis=0)))
     distance = None
     if len(found):
-        distance = Distances.of(distance_to_edges(_samples(found, vertices), body)).scaled(1.0 / diagonal)
+        points, shares = _samples(found, vertices)
+        distance = Distances.of(distance_to_edges(points, body), shares).scaled(1.0 / diagonal)
     angles = Distances.of(*_angles(body, vertices, faces))
     return Sharpness(len(found), len(found.corners), float(found.lengths.sum()), distance, angles)
 
 
-def _samples(found: Features, vertices: Array) -> Array:
-    """Return points (k, 3) that are evenly spread over sharp edges, their ends among them."""
-    step = float(found.lengths.sum()) / _SAMPLES
-    points = []
-    for a, b in vertices[found.edges]:
-        count = max(2, 1 + int(np.ceil(np.linalg.norm(b - a) / step)))
-        points.append(a + np.linspace(0.0, 1.0, count)[:, None] * (b - a))
-    return np.concatenate(points)
+def _samples(found: Features, vertices: Array) -> tuple[Array, Array]:
+    """Return points (k, 3) on sharp edges, their ends among them, and the share (k,) of the length that each has."""
+    first, last = vertices[found.edges[:, 0]], vertices[found.edges[:, 1]]
+    lengths = np.linalg.norm(last - first, axis=1)
+    pieces = np.maximum(1, np.ceil(_SAMPLES * lengths / lengths.sum())).astype(np.int64)
+    edge = np.repeat(np.arange(len(pieces)), pieces + 1)
+    place = np.arange(len(edge)) - np.repeat(np.cumsum(pieces + 1) - pieces - 1, pieces + 1)
+    share = place / pieces[edge]
+    at_end = (place == 0) | (place == pieces[edge])
+    weights = np.where(at_end, 0.5, 1.0) * (lengths / pieces)[edge]
+    return first[edge] + share[:, None] * (last - first)[edge], weights / weights.sum()
 
 
 def distance_to_edges(points: Array, body: BSplineVolume | MultiPatch) -> Array:

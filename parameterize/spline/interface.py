@@ -92,6 +92,15 @@ def face_layer(array: Floats, face: str) -> Floats:
     return np.take(array, -1 if side else 0, axis=axis)
 
 
+def outward(layer: Floats, face: str) -> Floats:
+    """Return the layer (m_a, m_b, ...) of a face so that its two directions and the way out are right-handed.
+
+    The patch is right-handed. Where the order of its directions points inward, the two are exchanged.
+    """
+    axis, side = axis_side(face)
+    return layer if bool(side) != (axis == 1) else layer.swapaxes(0, 1)
+
+
 def orientations(first: Face, second: Face) -> Iterator[Interface]:
     """Yield the eight ways in which two faces may lie on each other."""
     for swapped, a, b in product((False, True), repeat=3):

@@ -19,13 +19,14 @@ from ..optimization.phases import Polish, Schedule, Separate, Unfold
 from ..optimization.reassignment import reassign
 from ..optimization.sliding import SlidingParameters
 from ..optimization.surface_distance import TANGENTIAL, SurfaceFit
+from ..optimization.term import Weights
 from ..progress import timed
 from ..spline.bspline import greville, open_uniform_knots
 from ..spline.nets import Nets
 from ..spline.spline_map import SplineMap
 from ..surface.geometry import vertex_quadrics, vertex_weights
 from ..threads import one_blas_thread
-from .growth import STEPS, STIFF, Grow
+from .growth import STEPS, Grow
 from .on_cube import MORE_ROUNDS
 from .start import MOST_POINTS, Attempt, Start, Task, optimized
 
@@ -35,6 +36,8 @@ _USUAL_STEPS = (20, 8, 8, 8)  # of Newton's method in the later rounds of most r
 _FACE_SHARES = (1e-3, 1e-2, 0.1)  # of the weight of the surface's data while the faces are drawn to it, round by round
 _POINT_SHARES = (0.01, 0.1)  # the same while the surface's points draw F, before they have all their weight
 _LONGEST = 0.055  # length at volume 1 above which the mesh's edges are cut: about a span across a block
+# Until blocks have no fault: thin ones do not buckle, and far thinner parts of the body keep their small det J.
+STIFF_WEIGHTS = Weights(10.0 * Weights.fairness, least_floor=0.05)
 _SOFT_ROUNDS = 4  # with the usual weights, after a stiff map is certified
 _FAR = 0.2  # root mean square distance from the surface beyond which a folded map is given up
 
@@ -65,9 +68,8 @@ class AlongSkeleton(Start):
                 _log.warning("%s", error)
                 return None
             fit = surface_fit(task, first)
-        return softened(
-            optimized(first, fit, schedule(task.config), task, checkpoints, STIFF.weights), task, checkpoints
-        )
+        stiff = optimized(first, fit, schedule(task.config), task, checkpoints, STIFF_WEIGHTS)
+        return softened(stiff, task, checkpoints)
 
 
 BLOCKS = AlongSkeleton("blocks", "blocks", "laying blocks along the skeleton")

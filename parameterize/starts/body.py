@@ -17,16 +17,18 @@ from ..blocks.room import Room
 from ..checkpoint import Checkpoints
 from ..handles.cutting import without_handles
 from ..handles.layout import Footprint, footprint, stub_layout
+from ..optimization.endings import Course
 from ..optimization.reassignment import boundary_samples
 from ..progress import timed
 from ..spline.bspline import greville
 from ..spline.interface import face_layer
 from ..spline.spline_map import SplineMap
 from ..spline.volume import BSplineVolume
+from ..surface.errors import MeshError
 from ..surface.surface import surface_from_arrays
 from ..threads import one_blas_thread
-from .blocks import nets_of, points_of, schedule, softened, surface_fit
-from .growth import GROWTH, STIFF
+from .blocks import STIFF_WEIGHTS, nets_of, points_of, schedule, softened, surface_fit
+from .growth import GROWTH
 from .start import MOST_POINTS, Attempt, Start, Task, optimized
 
 _log = logging.getLogger(__name__)
@@ -49,38 +51,52 @@ class WithStubs(Start):
         """
         surface = task.surface
         with timed(task.seconds, "fit"), one_blas_thread():
-            handles, most = task.handles, task.own + MOST_POINTS
-            found = handles and without_handles(surface.unit_vertices, surface.faces, task.skeleton, handles, most)
-        if not found:
+            most = task.own + MOST_POINTS
+            found = without_handles(surface.unit_vertices, surface.faces, task.skeleton, task.handles, most)
+        if found is None:
             return None
         vertices, faces, rims = found
-        body = _of_body(task, vertices, faces, checkpoints)
-        with timed(task.seconds, "fit"), one_blas_thread():
-            ends = [(_footprint(body, first), _footprint(body, last)) for first, last in rims]
-            room = Room(task.skeleton, Body(surface.unit_vertices, surface.faces))
-            try:
-                layout, parts = stub_layout(body.volume, ends, handles, room)
-            except LayoutError as error:
-                _log.warning("%s", error)
-                return None
-            if len(layout) > (task.config.blocks or len(layout)):
-                return None
-            first = _first(layout, parts, task.config.spline.degree)
-            fit = surface_fit(task, first)
+        try:
+            body, earlier = _of_body(task, vertices, faces, checkpoints)
+            with timed(task.seconds, "fit"), one_blas_thread():
+                first = _with_stubs(task, body, rims)
+                fit = surface_fit(task, first)
+        except (MeshError, LayoutError) as error:
+            _log.warning("%s", error)
+            return None
         rounds = schedule(task.config, _FACE_SHARES, _POINT_SHARES)
-        return softened(optimized(first, fit, rounds, task, checkpoints, STIFF.weights), task, checkpoints)
+        made = softened(optimized(first, fit, rounds, task, checkpoints, STIFF_WEIGHTS), task, checkpoints)
+        return replace(made, course=made.course.after(earlier))
 
 
 BODY = WithStubs("body with stubs", "blocks", "mapping the body without its handles, and laying rods for these,")
 
 
-def _of_body(task: Task, vertices: Array, faces: IntArray, checkpoints: Checkpoints) -> SplineMap:
-    """Return the map of the body without its handles, at the place of the whole body at volume 1."""
+def _of_body(task: Task, vertices: Array, faces: IntArray, checkpoints: Checkpoints) -> tuple[SplineMap, Course]:
+    """Return the map of the body without its handles, at the place of the whole body at volume 1, and its rounds.
+
+    Raises MeshError where the surface without handles is none that can be mapped.
+    """
     surface = surface_from_arrays(vertices, faces, f"{task.surface.name} without handles")
     config = replace(task.config, blocks=1, refinement=None).with_control_points(_CONTROL_POINTS)
     own = replace(task, surface=surface, config=config, given_corners=None)
-    spline = GROWTH.make(own, checkpoints.of_part("body")).found.spline
-    return spline.with_control(surface.from_unit(spline.control.T).T)
+    grown = GROWTH.make(own, checkpoints.of_part("body"))
+    spline = grown.found.spline
+    return spline.with_control(surface.from_unit(spline.control.T).T), grown.course
+
+
+def _with_stubs(task: Task, body: SplineMap, rims: list[tuple[Array, Array]]) -> SplineMap:
+    """Return the first map of all blocks: the body's, cut where its handles begin and end, and rods between these.
+
+    Raises LayoutError where no rods fit, or more blocks are needed than the options allow.
+    """
+    surface, most = task.surface, task.config.blocks
+    ends = [(_footprint(body, first), _footprint(body, last)) for first, last in rims]
+    room = Room(task.skeleton, Body(surface.unit_vertices, surface.faces))
+    layout, parts = stub_layout(body.volume, ends, task.handles, room)
+    if most is not None and len(layout) > most:
+        raise LayoutError(f"a body with stubs needs {len(layout)} blocks, and at most {most} are allowed: allow more")
+    return _first(layout, parts, task.config.spline.degree)
 
 
 def _footprint(body: SplineMap, rim: Array) -> Footprint:

@@ -19,7 +19,8 @@ class AttemptReport:
     ending : str
         Why its rounds ended.
     rounds : dict of str to int
-        The number of rounds by phase: grow, shape, unfold, separate, polish.
+        The number of rounds by phase: approach, grow, shape, unfold, separate, polish. Those of a body with stubs
+        begin with the rounds of the body alone.
     seconds : dict of str to float
         Wall seconds of train and fit, and by phase.
     unproved : int or None

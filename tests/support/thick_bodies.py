@@ -66,3 +66,16 @@ def star(directions, reach=1.6, radius=0.22, ball=0.5):
         box,
         56,
     )
+
+
+BALL, EAR = 0.9, 0.13  # radii of the body below, and of its handles
+
+
+def eared():
+    """Return a ball with a thin handle, or ear, on either side."""
+
+    def distance(x):
+        ears = (ring(np.array([x[0] - side, x[1], x[2]]), 0.0, 0.4, EAR) for side in (-1.0, 1.0))
+        return np.minimum(np.linalg.norm(x, axis=0) - BALL, np.minimum(*ears))
+
+    return implicit(distance, (1.7, 1.1, 1.1), 64)
