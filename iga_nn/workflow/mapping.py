@@ -140,7 +140,13 @@ def _prepare(
     if mapping.resume and not is_resumed:
         log.info("no checkpoint, starting anew")
     with state.timed("load"):
-        expected = forecast(surface.fitted[0], mapping.config(), device=given.identity["device"], unknowns=unknowns)
+        expected = forecast(
+            surface.fitted[0],
+            mapping.config(),
+            device=given.identity["device"],
+            unknowns=unknowns,
+            corners=given.marks is not None,
+        )
     log.info("estimate: %s", expected)
     needed = f"{rounded(expected.memory_mb / 1000.0, 1)} GB of memory are needed"
     warn_of_memory(expected.memory_mb, needed, "lower --control-points or --refine, or free some")
