@@ -21,8 +21,9 @@ import iga_nn
 from iga_nn.cli.commands import main as iga_nn_main
 from iga_nn.figures.evaluate import SECTIONS
 from iga_nn.figures.fields import error_of, points_of
+from iga_nn.figures.ranges import error_range
 from iga_nn.figures.render import Patch, can_draw, draw, widest_view
-from iga_nn.figures.style import PANEL, color_bar, colors, error_range, panels_of, save
+from iga_nn.figures.style import PANEL, color_bar, colors, panels_of, save
 from iga_nn.report.document import read
 from solve import Solution
 

@@ -1,6 +1,7 @@
 """parameterize: a closed surface to a trivariate B-spline volume, certified where its proof succeeds."""
 
 import hashlib
+from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
 from numbers import Integral
 from pathlib import Path
@@ -33,6 +34,7 @@ from .starts.tried import AttemptReport, best_of
 from .surface.surface import Surface
 from .training.backend import choose_device, choose_precision
 
+MadeCallback = Callable[[BSplineVolume | MultiPatch, dict[str, NDArray[Any]]], None]
 _LAST_SLIDES = 20  # of the boundary parameters before the boundary map is made, and again after `_LAST_SWEEPS`
 _LAST_SWEEPS = 600  # over the triangles that the last slides flipped, at most: nothing moves after them
 
@@ -104,6 +106,7 @@ def parameterize(
     dtype: str = "float32",
     corners: ArrayLike | None = None,
     progress: ProgressCallback | None = None,
+    when_made: MadeCallback | None = None,
     checkpoint_dir: str | Path | None = None,
     resume: bool = False,
 ) -> Parameterization:
@@ -128,6 +131,9 @@ def parameterize(
         They are those of one cube: refused for a body with handles, and where `config.blocks` asks for several.
     progress : callable, optional
         Called with a `Progress` at every step.
+    when_made : callable, optional
+        Called with the volume and the history as soon as they are known; the volume is certified and measured after
+        that.
     checkpoint_dir : str or Path, optional
         Where checkpoints go.
     resume : bool
@@ -187,6 +193,9 @@ def parameterize(
         volume, boundary = _in_users_units(found, fit, task)
         if copy is not surface:
             boundary = carried(boundary, volume, surface)
+    steps = history.arrays()
+    if when_made is not None:
+        when_made(volume, steps)
     with timed(seconds, "certify"):
         certificate = certify(volume)  # of the volume in the user's units: bringing it there rounds
         proofs = certificate, check_boundary(volume)
@@ -196,7 +205,7 @@ def parameterize(
         boundary=boundary,
         certificate=certificate,
         quality=quality,
-        history=history.arrays(),
+        history=steps,
         seconds=seconds,
         device=place,
         seed=seed,

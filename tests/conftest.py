@@ -89,6 +89,13 @@ def found_once() -> dict[str, Any]:
     }
 
 
+def told(result: Any, when_made: Any) -> Any:
+    """Return a map that is there already, and tell of it as `parameterize` does."""
+    if when_made is not None:
+        when_made(result.volume, result.history)
+    return result
+
+
 @pytest.fixture
 def formula_training(monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
     """Replace the training by the benchmark map: `formula_training()`, or with an amplitude, or an error to raise."""
@@ -101,13 +108,15 @@ def formula_training(monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
 
         result = formula_parameterization(amplitude)
 
-        def parameterize(surface: Any, config: Any = None, *, progress: Any = None, **_: Any) -> Any:
+        def parameterize(
+            surface: Any, config: Any = None, *, progress: Any = None, when_made: Any = None, **_: Any
+        ) -> Any:
             if error is not None:
                 raise error
             for step in range(3):
                 if progress is not None:
                     progress(Progress("S(2)", step, 3, 0.5, 0, 1.0))
-            return result
+            return told(result, when_made)
 
         monkeypatch.setattr("parameterize.run.parameterize", parameterize)
 
@@ -142,7 +151,7 @@ def short_training(monkeypatch: pytest.MonkeyPatch, few_distances: None, trained
     full = iga_nn.parameterize  # loaded before it is replaced: else what replaces it would be put back
 
     @functools.wraps(full)
-    def parameterize(surface: Any, config: Any = None, **options: Any) -> Any:
+    def parameterize(surface: Any, config: Any = None, when_made: Any = None, **options: Any) -> Any:
         short = shortened(config or preset("fast"))
         short = short.with_control_points(min(8, short.spline.control_points))
         changes_nothing = ("progress", "checkpoint_dir")
@@ -150,7 +159,7 @@ def short_training(monkeypatch: pytest.MonkeyPatch, few_distances: None, trained
         asked = (surface.name, surface.sha256, short, *sorted(given.items()))
         if asked not in trained:
             trained[asked] = full(surface, short, **options)
-        return trained[asked]
+        return told(trained[asked], when_made)
 
     monkeypatch.setattr(home, "parameterize", parameterize)
     monkeypatch.setattr(iga_nn, "parameterize", parameterize, raising=False)

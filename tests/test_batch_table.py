@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from browser import running
-from conftest import formula_parameterization
+from conftest import formula_parameterization, told
 from PIL import Image
 
 import iga_nn
@@ -33,7 +33,9 @@ def finished(tmp_path_factory):
     """The folder of a batch with a finished surface, the cube."""
     folder = tmp_path_factory.mktemp("finished")
     with pytest.MonkeyPatch.context() as patched:
-        patched.setattr("parameterize.run.parameterize", lambda *_, **__: formula_parameterization())
+        patched.setattr(
+            "parameterize.run.parameterize", lambda *_, when_made, **__: told(formula_parameterization(), when_made)
+        )
         patched.setattr("iga_nn.figures.render.can_draw", lambda: False)
         patched.chdir(folder)
         iga_nn.run("poisson", "cube", "out/cube", poisson=PoissonOptions(refine=(0, 1)))

@@ -6,7 +6,7 @@ import json
 from dataclasses import asdict, replace
 
 import pytest
-from conftest import formula_parameterization
+from conftest import formula_parameterization, told
 
 from iga_nn.cli.commands import main
 from iga_nn.report import document as reports
@@ -52,9 +52,9 @@ def asked(monkeypatch):
     """The configuration that the training is given, in whose place there is a map by formula."""
     seen = []
 
-    def parameterize(surface, config, **options):
+    def parameterize(surface, config, when_made=None, **options):
         seen.append(config)
-        return replace(formula_parameterization(), refinement=MET)
+        return told(replace(formula_parameterization(), refinement=MET), when_made)
 
     monkeypatch.setattr("parameterize.run.parameterize", parameterize)
     return seen

@@ -120,14 +120,14 @@ def test_the_pictures_of_an_older_run_go(formula_training, in_folder):
 
 def test_where_the_boundary_meets_itself_there_is_a_picture(tmp_path, small_views):
     volume = bent(1.3)
-    RunFolder(tmp_path).draw("map", volume=volume, meeting=check_boundary(volume).meeting)
+    RunFolder(tmp_path).draw("map", faulty=volume, meeting=check_boundary(volume).meeting)
     assert shown(tmp_path / "meeting.png") and not (tmp_path / "folds.png").exists()
 
 
 def test_folds_are_drawn_with_their_number(tmp_path, small_views):
     volume = folded_at_one_end()
     places = advice.span_places(volume, certify(volume).unproved)
-    RunFolder(tmp_path).draw("map", volume=volume, places=places)
+    RunFolder(tmp_path).draw("map", faulty=volume, places=places)
     assert shown_in_grey(tmp_path / "folds.png")
 
 

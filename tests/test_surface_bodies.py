@@ -1,10 +1,12 @@
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 from mesh_files import ball, joined, obj
 
-from parameterize.surface.surface import bodies_in, surface_from_arrays
+from parameterize.surface.surface import MeshError, bodies_in, surface_from_arrays
 
 
 def test_largest_is_the_one_of_most_volume():
@@ -33,6 +35,15 @@ def test_a_copy_is_no_second_body():
     assert surface.notices == (
         "dropped 1 component (320 faces) exactly on the faces of others: the volume is unchanged",
     )
+
+
+def test_bodies_that_cross_are_named_with_a_place():
+    three = joined(ball(center=(9, 0, 0)), ball(), ball(center=(1, 0, 0)))
+    with pytest.raises(MeshError, match=r"components 1 and 2 cross each other at \((.*)\): unite them") as refused:
+        surface_from_arrays(*three)
+    place = np.array(re.search(r" at \((.*?)\)", str(refused.value))[1].split(","), dtype=float)
+    for middle in ([0, 0, 0], [1, 0, 0]):
+        assert np.linalg.norm(place - middle) == pytest.approx(1.0, abs=0.1)
 
 
 def test_open_bodies_are_measured_too_and_only_the_chosen_one_is_closed():

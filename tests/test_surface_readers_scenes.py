@@ -78,6 +78,37 @@ def test_strips_and_fans(mode, rows, tmp_path):
     assert read(tmp_path, "cube.glb", glb((gltf(**more)[0], binary + first + second))).volume == pytest.approx(1.0)
 
 
+@pytest.mark.parametrize(("named", "stored"), [("a.bin", "a.bin"), ("parts/my%20cube.bin", "parts/my cube.bin")])
+def test_arrays_of_a_gltf_may_be_in_a_file_beside_it(named, stored, tmp_path):
+    text, binary = gltf(beside=named)
+    (tmp_path / stored).parent.mkdir(exist_ok=True)
+    (tmp_path / stored).write_bytes(binary)
+    assert read(tmp_path, "cube.gltf", text).volume == pytest.approx(1.0)
+    packed = zipped({"deep/cube.gltf": text, f"deep/{stored}": binary})
+    assert read(tmp_path, "cube.zip", packed).volume == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("named", ["../a.bin", "/tmp/a.bin", "http://a.org/a.bin", "a/../../a.bin", "%2E%2E/a.bin", ""])
+def test_a_gltf_reads_no_file_outside_its_folder(named, tmp_path):
+    (tmp_path / "inner").mkdir()
+    text, binary = gltf(beside="a.bin")
+    (tmp_path / "a.bin").write_bytes(binary)
+    text = text.replace(b'"a.bin"', f'"{named}"'.encode())
+    with pytest.raises(MeshError, match="which is no file beside it: save it as .glb"):
+        read(tmp_path / "inner", "cube.gltf", text)
+    with pytest.raises(MeshError, match="which is no file beside it: save it as .glb"):
+        read(tmp_path, "cube.zip", zipped({"inner/cube.gltf": text, "a.bin": binary}))
+
+
+def test_a_missing_file_of_a_gltf_is_named_and_large_ones_stop_at_the_limit(tmp_path):
+    with pytest.raises(MeshError, match=r"'a.bin', which is not beside it: put it there"):
+        read(tmp_path, "cube.gltf", gltf(beside="a.bin")[0])
+    with (tmp_path / "a.bin").open("wb") as stream:
+        stream.truncate(70 << 20)  # sparse: takes no disk
+    with pytest.raises(MeshError, match="take more than the limit"):
+        read(tmp_path, "cube.gltf", gltf(beside="a.bin")[0], max_faces=12)
+
+
 def test_components_and_items_of_a_3mf_have_their_places_and_the_unit_is_kept(tmp_path):
     surface = read(tmp_path, "cube.3mf", threemf())
     assert surface.volume == pytest.approx(8.0) and surface.unit == surface.summary()["unit"] == "in"

@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 from blocks import mapped_to, outer_surface
-from conftest import found_once
+from conftest import found_once, told
 from patches import SYMMETRIES, patch, turned
 
 from iga_nn.cli.commands import main
@@ -46,7 +46,11 @@ def on_blocks(in_folder, monkeypatch, few_distances):
     write_surface(in_folder / "ell.obj", body)
     for name, kept in found_once().items():
         monkeypatch.setattr(name, kept)
-    monkeypatch.setattr("parameterize.run.parameterize", lambda surface, *_, seed, **__: mapped_to(body, surface, seed))
+
+    def parameterize(surface, *_, seed, when_made, **__):
+        return told(mapped_to(body, surface, seed), when_made)
+
+    monkeypatch.setattr("parameterize.run.parameterize", parameterize)
     return body
 
 

@@ -16,8 +16,10 @@ import iga_nn
 import parameterize.run
 from iga_nn.cli.commands import main
 from iga_nn.report import document as report
-from iga_nn.workflow.cost_estimate import Forecast, available_memory_mb, forecast
+from iga_nn.workflow.cost_estimate import TRAINING_STEP, Forecast, available_memory_mb, forecast
 from parameterize.config import preset
+from parameterize.polyhedra import layout
+from parameterize.polyhedra.prisms import columns
 from parameterize.progress import Progress
 
 CPU = "cpu"
@@ -45,6 +47,25 @@ def test_more_work_takes_longer_and_more_memory():
         assert 0.0 < found.seconds_after("spline") < found.seconds_after("edges") < found.seconds[1]
         assert found.seconds_after("S(2)") == found.seconds_after("edges") == found.after[0]
     assert usual.seconds_after("spline") < solved.seconds_after("spline")
+
+
+def test_given_corners_on_a_box_are_trained(monkeypatch):
+    cube, quick = iga_nn.sample("cube"), preset("fast").with_control_points(8)
+    monkeypatch.setattr("iga_nn.workflow.cost_estimate._pass_seconds", lambda *_: 1e-3)
+    monkeypatch.setattr("iga_nn.workflow.cost_estimate._product_seconds", lambda *_: 1e-3)
+    exact, trained = forecast(cube, quick, device=CPU), forecast(cube, quick, device=CPU, corners=True)
+    steps = sum(stage.steps for stage in quick.stages)
+    assert trained.seconds[0] - exact.seconds[0] > 100 * TRAINING_STEP * steps * 1e-3  # at least 100 points a step
+
+
+def test_the_division_of_the_estimate_is_that_of_the_run(monkeypatch):
+    asked = []
+    monkeypatch.setattr(layout, "columns", lambda body: asked.append(body) or columns(body))
+    surface, quick = iga_nn.sample("cube"), preset("fast").with_control_points(8)
+    forecast(surface, quick, device=CPU)
+    assert len(iga_nn.parameterize(surface, quick).attempts) == len(asked) == 1
+    forecast(surface, quick.with_blocks(3), device=CPU)
+    assert len(asked) == 2
 
 
 def test_the_calibration_takes_less_than_a_second_and_no_random_numbers():

@@ -19,7 +19,7 @@ from solve.forms.form import Quantity
 from solve.quantities import grid_values
 
 from .evaluate import Body, Grid, Solved, all_grids, arap_of, error_at, fields_on, flat, problems_on
-from .style import ColorRange, error_range, even_range
+from .ranges import ColorRange, error_range, even_range
 
 SAMPLES = 121  # per direction of a face or mid-section
 LATTICE = 41  # per direction of the cube

@@ -9,8 +9,9 @@ from parameterize.spline.multipatch import as_multipatch, size_of
 from solve import Modes
 
 from .evaluate import Body, all_grids, fields_on, flat, outer_faces
+from .ranges import ColorRange
 from .render import Patch, draw, view_of
-from .style import PANEL, ColorRange, colors, panels_of, save
+from .style import PANEL, colors, panels_of, save
 
 MOST, COLUMNS = 6, 3
 SAMPLES = 61  # a direction of a face

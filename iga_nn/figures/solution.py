@@ -19,8 +19,9 @@ from .cutaway import cut_of, visible
 from .evaluate import Body, Solved, outer_faces
 from .fields import STRESS, Field, Samples, diagonal_of, error_of, fields_of, points_of, solution_of, vectors_of
 from .inside import show_inside
+from .ranges import with_unit
 from .render import Patch, check_drawable, draw
-from .style import PANEL, color_bar, colors, panels_of, save, show_around, with_unit
+from .style import PANEL, color_bar, colors, panels_of, save, show_around
 from .warp import in_words, warp_of
 
 

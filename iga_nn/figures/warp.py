@@ -6,7 +6,7 @@ import numpy as np
 
 from .evaluate import Solved
 from .fields import is_spatial, quantities_of, solution_of
-from .style import SMALLEST
+from .ranges import SMALLEST
 
 SHARE = 0.08  # of the diagonal of the body's box: the largest displacement as drawn
 DIGITS = (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0)  # first digits of a factor; each is at most 1.5 times the one before

@@ -44,7 +44,7 @@ from ..figures.fields import (
     vectors_of,
 )
 from ..figures.palette import color_labels, face_colors
-from ..figures.style import even_range, with_unit
+from ..figures.ranges import even_range, with_unit
 from ..figures.warp import factor_for, is_displacement, warp_of
 from ..options import NO_UNITS, Units
 

@@ -91,15 +91,17 @@ def forecast(
     *,
     device: str,
     unknowns: int = 0,
+    corners: bool = False,
     clock: Clock = time.perf_counter,
 ) -> Forecast:
     """Return the estimate for this machine under its present load.
 
-    unknowns: the number of unknowns of the largest problem that is solved afterwards. A second start, where the first
+    unknowns: the number of unknowns of the largest problem that is solved afterwards. corners: whether the user gives
+    corners: those are of one cube that is trained, also where planes bound the body. A second start, where the first
     map is not certified, takes the same time again. A body with handles has blocks, which are not trained; exact blocks
     are not optimised either.
     """
-    from parameterize.polyhedra.layout import exact_layout
+    from parameterize.polyhedra.layout import division_of
     from parameterize.training.backend import one_thread_an_operation
     from parameterize.training.effort import points_of_a_step
 
@@ -111,14 +113,14 @@ def forecast(
     last = (REST + LAST_VERTEX * vertices + UNKNOWN * unknowns) * one_pass
     step = NEWTON_STEP * product + NEWTON_VERTEX * vertices * one_pass
     in_blocks = surface.genus > 0
-    is_exact = exact_layout(surface.vertices, surface.faces, 1, config.blocks) is not None
+    is_exact = not corners and division_of(surface, config.blocks) is not None
     fits = [
         share * (FIT * product + min(rounds, spline.rounds) * (min(steps, spline.steps) * step + CERTIFICATE * product))
         for (rounds, steps), share in zip((EASY, HARD), BLOCKS if in_blocks else (1.0, 1.0), strict=True)
     ]
     if is_exact:
         fits = [CERTIFICATE * product] * 2
-    steps_of_training = (0, 0) if in_blocks or is_exact else _training_steps(config)
+    steps_of_training = (0, 0) if in_blocks or is_exact else _training_steps(config, corners)
     trainings = [count * TRAINING_STEP * points * one_pass for count in steps_of_training]
     low, high = sorted(training + fit + last for training, fit in zip(trainings, fits, strict=True))
     most = spline.control_points
@@ -133,14 +135,14 @@ def forecast(
     return Forecast((low, high), memory, (fits[0] + last, last))
 
 
-def _training_steps(config: Config) -> tuple[float, float]:
+def _training_steps(config: Config, corners: bool) -> tuple[float, float]:
     """Return the training steps for an easy surface, and for a hard one: those of the first stage, or none.
 
-    The first stage shows whether a surface is hard.
+    The first stage shows whether a surface is hard. corners: whether they are given: then there is one start.
     """
     steps, limit = sum(stage.steps for stage in config.stages), config.train.easy_loss
     steps += math.ceil(config.train.race * next((stage.steps for stage in config.stages if stage.name == "cube"), 0))
-    if limit is None or config.starts == 1:
+    if limit is None or config.starts == 1 or corners:
         return steps, steps
     return (0, 0) if limit == 0.0 else (steps, config.stages[0].steps)
 

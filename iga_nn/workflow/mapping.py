@@ -26,6 +26,7 @@ from solve.forms.boundary_value_problem import BoundaryValueProblem
 from solve.forms.frame import UnitFrame
 
 from ..errors import InputError, input_errors
+from ..figures.evaluate import Body
 from ..models import resolve
 from ..options import MapOptions
 from ..report import document as reports
@@ -37,7 +38,7 @@ from .regions import check_regions, frame_of
 from .verdict import tell
 
 if TYPE_CHECKING:
-    from parameterize.run import Parameterization
+    from parameterize.run import MadeCallback, Parameterization
 
 log = logging.getLogger(__name__)
 
@@ -102,14 +103,18 @@ def map_surface(
     known: the command that repeats the run and the identity of the run, for the report. problem, unknowns: the problem
     that is solved on the map, and its number of unknowns.
     """
+
+    def made(body: Body, history: dict[str, Any]) -> None:
+        state.begin("map", "solution")  # files that stay until the checkpoint of a resumed run is accepted
+        state.write(**known)  # first, so that files which a full disk or a kill leaves belong to a run
+        _draw(state, given, body, history)
+
     with compilation_told():
         expected = _prepare(state, given, mapping, problem, unknowns)
-        result = _train(given, expected, mapping, progress, state.folder / CHECKPOINT)
-    state.begin("map", "solution")  # files that stay until the checkpoint of a resumed run is accepted
+        result = _train(given, expected, mapping, progress, made, state.folder / CHECKPOINT)
     state.seconds.update(result.seconds)
-    state.write(**known)  # first, so that files which a full disk or a kill leaves belong to a run
     _write(state, given, expected, result, mapping)
-    _draw(state, given, result)
+    _draw_defects(state, result)
     return result
 
 
@@ -135,7 +140,13 @@ def _prepare(
     if mapping.resume and not is_resumed:
         log.info("no checkpoint, starting anew")
     with state.timed("load"):
-        expected = forecast(surface.fitted[0], mapping.config(), device=given.identity["device"], unknowns=unknowns)
+        expected = forecast(
+            surface.fitted[0],
+            mapping.config(),
+            device=given.identity["device"],
+            unknowns=unknowns,
+            corners=given.marks is not None,
+        )
     log.info("estimate: %s", expected)
     needed = f"{rounded(expected.memory_mb / 1000.0, 1)} GB of memory are needed"
     warn_of_memory(expected.memory_mb, needed, "lower --control-points or --refine, or free some")
@@ -224,9 +235,17 @@ def _check_somewhere(evaluate: Callable[[Array, Array], object], points: Array, 
 
 
 def _train(
-    given: MapInput, expected: Forecast, mapping: MapOptions, progress: ProgressCallback | None, checkpoint: Path
+    given: MapInput,
+    expected: Forecast,
+    mapping: MapOptions,
+    progress: ProgressCallback | None,
+    made: MadeCallback,
+    checkpoint: Path,
 ) -> Parameterization:
-    """Train, and return the map. Raises InputError for a checkpoint of another run, and for corners without paths."""
+    """Train, and return the map. Raises InputError for a checkpoint of another run, and for corners without paths.
+
+    made: `when_made` of `parameterize`.
+    """
     from parameterize.blocks.layout import LayoutError
     from parameterize.checkpoint import CheckpointError
     from parameterize.cube.edge_paths import PathError
@@ -245,6 +264,7 @@ def _train(
             device=mapping.device,
             corners=given.corners,
             progress=tell,
+            when_made=made,
             checkpoint_dir=checkpoint,
             resume=mapping.resume,
         )
@@ -278,13 +298,17 @@ def _write(
     tell(state, mapping)
 
 
-def _draw(state: RunFolder, given: MapInput, result: Parameterization) -> None:
-    """Draw the map, its blocks, the places without a proof and the places where it meets itself, if there are any."""
-    known: dict[str, Any] = {"blocks": result.volume} if isinstance(result.volume, MultiPatch) else {}
+def _draw(state: RunFolder, given: MapInput, body: Body, history: dict[str, Any]) -> None:
+    """Draw the map, its blocks, and the course of the training: beside the run they are done before the solve is."""
+    known: dict[str, Any] = {"blocks": body} if isinstance(body, MultiPatch) else {}
+    if len(next(iter(history.values()))):  # exact blocks have no steps
+        known["history"] = history
+    state.draw("map", volume=body, marks=given.marks, **known)
+
+
+def _draw_defects(state: RunFolder, result: Parameterization) -> None:
+    """Draw the places without a proof and the places where the map meets itself, if there are any."""
     if len(places := unproved_places(result.volume, result.certificate)):
-        known["places"] = places
+        state.draw("map", faulty=result.volume, places=places)
     if meeting := result.quality.boundary_check.meeting:
-        known["meeting"] = meeting
-    if len(next(iter(result.history.values()))):  # exact blocks have no steps
-        known["history"] = result.history
-    state.draw("map", volume=result.volume, marks=given.marks, **known)
+        state.draw("map", faulty=result.volume, meeting=meeting)

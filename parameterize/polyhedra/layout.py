@@ -1,6 +1,7 @@
 """Makes the blocks of a body that planes bound: the best of its divisions into hexahedra that is proved."""
 
 from collections.abc import Iterator
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -14,6 +15,8 @@ from ..spline.multipatch import MultiPatch
 from ..spline.nets import Nets
 from ..spline.volume import FACE_NAMES
 from ..surface.geometry import normals_and_areas, signed_volume
+from ..surface.surface import Surface
+from ..threads import one_blas_thread
 from .arrangement import arrangement_of
 from .hexahedra import Hexahedra, cubes, subdivided
 from .polyhedron import Polyhedron, polyhedron_of
@@ -24,6 +27,7 @@ MOST_BLOCKS = 150  # a body that needs more is not made of blocks
 LEAST_QUALITY = 0.1  # of a block: a corner is six degrees from flat, or det J a thousandth of that at another corner
 _SAME = 1e-5  # relative: the volume and the area of blocks that fill a body are those of its surface
 FEWEST_SPANS = 2  # along an edge of a block
+_known: WeakKeyDictionary[Surface, dict[int | None, Hexahedra | None]] = WeakKeyDictionary()  # by most blocks
 _LONGEST = 4  # times the spans of a block that is a cube: those along one direction, at most
 
 
@@ -32,15 +36,34 @@ def exact_layout(vertices: Array, faces: IntArray, spans: int, most: int | None 
 
     vertices: (n, 3), faces: (m, 3), of a closed surface. spans: across a block that is a cube. most: blocks, at most.
     """
+    found = _division(vertices, faces, most)
+    return None if found is None else layout_of(found, spans)
+
+
+def division_of(surface: Surface, most: int | None = None) -> Hexahedra | None:
+    """Return the hexahedra that fill the body of a surface at volume 1, as `exact_layout` does; None if none.
+
+    They are found once for a surface: the estimate of a run asks for them, too.
+    """
+    known = _known.setdefault(surface, {})
+    if most not in known:
+        with one_blas_thread():
+            points = surface.to_unit(surface.vertices)
+            known[most] = None if len(surface.crossings) else _division(points, surface.faces, most)
+    return known[most]
+
+
+def _division(vertices: Array, faces: IntArray, most: int | None) -> Hexahedra | None:
+    """Return the hexahedra of `exact_layout`; the proof is that of trilinear blocks, whatever spans they get."""
     body = polyhedron_of(vertices, faces)
     if body is None:
         return None
     limit = MOST_BLOCKS if most is None else min(most, MOST_BLOCKS)
     found = [one for one in _divisions(body, limit) if one.quality >= LEAST_QUALITY]
     for one in sorted(found, key=lambda one: one.cost):
-        layout = _layout(one, spans)
+        layout = layout_of(one, FEWEST_SPANS)
         if _fills(layout, body) and _is_proved(layout):
-            return layout
+            return one
     return None
 
 
@@ -63,8 +86,11 @@ def _divisions(body: Polyhedron, most: int) -> Iterator[Hexahedra]:
             yield parts
 
 
-def _layout(found: Hexahedra, spans: int) -> BlockLayout:
-    """Return hexahedra as blocks, with spans along their edges that are about equally long."""
+def layout_of(found: Hexahedra, spans: int) -> BlockLayout:
+    """Return hexahedra as blocks, with spans along their edges that are about equally long.
+
+    spans: across a block that is a cube.
+    """
     rows = found.points[found.turned().corners]  # (k, 2, 2, 2, 3)
     plain = BlockLayout.from_blocks([_block(k, one, (1, 1, 1)) for k, one in enumerate(rows)])
     knots = (open_uniform_knots(2, 1),) * 3

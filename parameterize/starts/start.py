@@ -22,7 +22,7 @@ from ..optimization.phases import Schedule
 from ..optimization.sliding import SlidingParameters
 from ..optimization.surface_distance import TANGENTIAL, SurfaceFit
 from ..optimization.term import Weights
-from ..polyhedra.layout import exact_layout
+from ..polyhedra.layout import division_of, layout_of
 from ..progress import timed
 from ..skeleton.choice import Choice, choose
 from ..skeleton.graph import Skeleton, SkeletonError
@@ -133,13 +133,15 @@ class Task:
     @cached_property
     def exact(self) -> BlockLayout | None:
         """Return exact blocks of a body that planes bound, at volume 1; None for others, and for given corners."""
-        surface, spline, most = self.surface, self.config.spline, self.config.blocks
-        if self.given_corners is not None or len(surface.crossings):
+        spline = self.config.spline
+        if self.given_corners is not None:
             return None
         with timed(self.seconds, "fit"), one_blas_thread():
-            points = surface.to_unit(surface.vertices)
-            found = exact_layout(points, surface.faces, spans_across(spline.control_points), most)
-        if found is None or len(found) > 1:
+            division = division_of(self.surface, self.config.blocks)
+            if division is None:
+                return None
+            found = layout_of(division, spans_across(spline.control_points))
+        if len(found) > 1:
             return found
         spans = spline.control_points - spline.degree
         return BlockLayout((replace(found.blocks[0], spans=(spans, spans, spans)),), ())

@@ -6,10 +6,11 @@ from typing import Literal
 import igl
 import numpy as np
 
-from ..arrays import Array, IntArray
+from ..arrays import Array, IntArray, in_brackets
 from .draft import Draft
 from .errors import MeshError
 from .geometry import connected, directed_edges
+from .topology import crossing_faces, crossing_places
 from .welding import is_oriented
 
 Choice = int | Literal["largest"] | None
@@ -77,13 +78,32 @@ def _many(draft: Draft, groups: list[IntArray], sizes: str) -> str:
     nested = _inside(draft, groups, outer)
     if nested:
         return (
-            f"{len(groups)} nested shells ({sizes}), component {nested[0]} lies inside component {outer}: one cube has "
-            f"no cavity; remove the inner shell, or fill it by choosing --component {outer}"
+            f"{len(groups)} nested shells ({sizes}), component {nested[0]} lies inside component {outer}: a body "
+            f"with a cavity gets no map, of one cube or of blocks; fill it by choosing --component {outer}, or connect "
+            "it with the outside by a hole"
+        )
+    if (crossed := _crossed(draft, groups)) is not None:
+        (first, second), place = crossed
+        return (
+            f"{len(groups)} components ({sizes}), components {first} and {second} cross each other at "
+            f"{in_brackets(place)}: unite them in the program that made them, or choose one with --component N"
         )
     return (
         f"{len(groups)} components ({sizes}): choose one with --component largest or --component N, take each with "
         "`iga-nn batch --split`, or join them"
     )
+
+
+def _crossed(draft: Draft, groups: list[IntArray]) -> tuple[tuple[int, int], Array] | None:
+    """Return two components that cross each other, and a place (3,) in the user's units; None where there are none."""
+    pairs = crossing_faces(draft.points, draft.faces)
+    owners = np.sort(_labels(groups)[pairs], axis=1)
+    between = np.flatnonzero(owners[:, 0] != owners[:, 1])
+    if not len(between):
+        return None
+    first, second = owners[between[0]].tolist()
+    (place,) = crossing_places(draft.points, draft.faces, pairs[between[:1]])
+    return (first, second), place * draft.size + draft.middle
 
 
 def _volumes(draft: Draft, groups: list[IntArray]) -> Array:

@@ -119,6 +119,8 @@ def shapes():
         "cavity.obj",
         accepted(obj(*joined(ball(2.0), _turned_inside(*ball()))), "12.50% of its volume", "--component", "largest"),
     )
+    yield "bubble.obj", refused(obj(*joined(ball(2.0), _turned_inside(*ball()))), "with a cavity gets no map")
+    yield "crossed.obj", refused(obj(*joined(ball(), ball(center=(1, 0, 0)))), "components 0 and 1 cross each other")
     yield "angle.obj", accepted(_angle(), "8 polygons cut into 20 triangles")
     yield "pocket.obj", accepted(_pocket(), "11 polygons cut into 28 triangles")
     yield "spike.obj", accepted(_spike(), "self-intersection")

@@ -416,6 +416,10 @@ def scene_readers():
     nodes = [{"children": [1], "rotation": [0.5, 0.5, 0.5, 0.5]}, {"mesh": 0, "name": "a", "scale": [2, 1, 1]}]
     yield Reader("glb", ".glb", check, (list(gltf()), list(gltf(nodes=nodes))), glb, packed=True)
     yield surface_reader("gltf", ".gltf", gltf(inside=False)[0])
+    beside = list(gltf(beside="a.bin"))
+    yield Reader(
+        "gltf, beside", ".zip", check, (beside,), lambda both: zipped(dict(zip(("a.gltf", "a.bin"), both, strict=True)))
+    )
     yield Reader("3mf", ".3mf", check, ([model()],), lambda pieces: threemf(pieces[0]))
     yield Reader("zip", ".zip", check, ([obj().encode()],), lambda pieces: zipped({"a/cube.obj": pieces[0]}))
     yield Reader("zip, bytes", ".zip", check, ([zipped({"cube.stl": binary_stl(), "b.txt": "b"})],))

@@ -9,8 +9,11 @@ import numpy as np
 from mesh_files import CUBE, TRIANGLES
 
 
-def gltf(vertices=CUBE, faces=TRIANGLES, nodes=None, primitive=None, inside=True, **more):
-    """The description (JSON) and the binary chunk of a mesh; inside: whether that chunk is the buffer."""
+def gltf(vertices=CUBE, faces=TRIANGLES, nodes=None, primitive=None, inside=True, beside="", **more):
+    """The description (JSON) and the binary chunk of a mesh; inside: whether that chunk is the buffer.
+
+    beside: the name of the file that is the buffer.
+    """
     binary = np.asarray(vertices, "<f4").tobytes() + np.asarray(faces, "<u2").tobytes()
     places = 12 * len(vertices)
     document = {
@@ -31,6 +34,8 @@ def gltf(vertices=CUBE, faces=TRIANGLES, nodes=None, primitive=None, inside=True
     }
     if not inside:
         document["buffers"][0]["uri"] = "data:application/octet-stream;base64," + b64encode(binary).decode()
+    if beside:
+        document["buffers"][0]["uri"] = beside
     return json.dumps(document).encode(), binary
 
 

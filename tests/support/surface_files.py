@@ -105,7 +105,7 @@ REFUSED = {
     "garbage.glb": ("hello\n", "its first word is not glTF"),
     "cut.glb": (glb(gltf())[:-20], "promises"),
     "draco.glb": (glb(gltf(primitive={"extensions": {"KHR_draco_mesh_compression": {}}})), "save it without compr"),
-    "beside.gltf": (gltf(buffers=[{"byteLength": 9, "uri": "cube.bin"}])[0], "in the file 'cube.bin': save it as .glb"),
+    "beside.gltf": (gltf(buffers=[{"byteLength": 9, "uri": "cube.bin"}])[0], "in 'cube.bin', which is not beside it"),
     "circle.glb": (glb(gltf(nodes=[{"children": [0]}])), "are no tree"),
     "range.glb": (glb(gltf(faces=TRIANGLES + 1)), "vertex numbers out of range"),
     "points.glb": (glb(gltf(primitive={"mode": 0})), "has no triangles"),

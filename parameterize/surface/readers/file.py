@@ -16,6 +16,7 @@ from ..errors import MeshError, check_face_count, check_finite, check_indices, w
 from ..groups import Groups, few, renumbered
 from ..triangulation import triangulate
 from .archive import Archive
+from .beside import Beside, in_archive, in_folder
 from .cad import read_iges, read_step
 from .common import DAMAGED, Content, most_bytes
 from .gltf import read_glb, read_gltf
@@ -40,10 +41,10 @@ READERS: dict[str, Callable[[bytes, int], Content]] = {
     ".vtu": read_vtu,
     ".vtp": read_vtp,
     ".vtk": read_vtk,
-    ".glb": read_glb,
-    ".gltf": read_gltf,
     ".3mf": read_3mf,
 }
+# The same, with the reader of the files that a file names.
+SCENES: dict[str, Callable[[bytes, int, Beside], Content]] = {".glb": read_glb, ".gltf": read_gltf}
 # The same, with the deflection of curved faces beside it.
 SOLID_MODELS: dict[str, Callable[[bytes, int, float | None], Content]] = {
     ".step": read_step,
@@ -51,7 +52,7 @@ SOLID_MODELS: dict[str, Callable[[bytes, int, float | None], Content]] = {
     ".iges": read_iges,
     ".igs": read_iges,
 }
-FORMATS = (*READERS, *SOLID_MODELS)
+FORMATS = (*READERS, *SCENES, *SOLID_MODELS)
 PACKED = (".gz", ".zip")
 
 
@@ -87,21 +88,24 @@ def read_mesh(path: Path, max_faces: int, deflection: float | None = None) -> Ra
     limit = most_bytes(max_faces)
     stored = data = _read_bytes(path, limit)
     unpacked: tuple[str, ...] = ()
+    beside = in_folder(path.parent, limit)
     if packed == ".gz":
         data, unpacked = _unpack(stored, limit), ("unpacked from .gz",)
     elif packed == ".zip":
         archive = Archive(stored, limit)
         member = archive.only(FORMATS)
         data, suffix, unpacked = archive.read(member), _endings(member)[0], (f"unpacked {member!r:.80} from .zip",)
+        beside = in_archive(archive, member)
     if not data.strip():
         raise MeshError("the file is empty: export it again")
     if deflection is not None and suffix not in SOLID_MODELS:
         raise MeshError(f"deflection is for {' '.join(SOLID_MODELS)}, whose faces are curved: leave --deflection out")
-    content = (
-        SOLID_MODELS[suffix](data, max_faces, deflection)
-        if suffix in SOLID_MODELS
-        else READERS[suffix](data, max_faces)
-    )
+    if suffix in SOLID_MODELS:
+        content = SOLID_MODELS[suffix](data, max_faces, deflection)
+    elif suffix in SCENES:
+        content = SCENES[suffix](data, max_faces, beside)
+    else:
+        content = READERS[suffix](data, max_faces)
     vertices, faces, notices, groups = triangles_of(content, max_faces)
     return RawMesh(vertices, faces, hashlib.sha256(stored).hexdigest(), unpacked + notices, groups, content.unit)
 

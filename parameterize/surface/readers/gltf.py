@@ -1,4 +1,4 @@
-"""glTF 2.0, as .glb or with its buffers inside the .gltf: the triangles of the scene, its nodes in their places.
+"""glTF 2.0, .glb and .gltf, with its buffers inside or in files beside it: the triangles of the scene in their places.
 
 Nodes and materials give groups by their names. The unit of the format is the metre. (Khronos, "glTF 2.0
 Specification", 2021.)
@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from ...arrays import Array, IntArray
 from ..errors import MeshError, check_face_count, check_indices
 from ..groups import gathered
+from .beside import Beside
 from .common import DAMAGED, Content
 
 NUMBERS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}  # by componentType
@@ -28,14 +29,14 @@ DEEPEST = 100  # nodes above a node
 UNIT = "m"
 
 
-def read_glb(data: bytes, max_faces: int) -> Content:
-    """Read a .glb."""
-    return scene_of(*_chunks(data), max_faces)
+def read_glb(data: bytes, max_faces: int, beside: Beside) -> Content:
+    """Read a .glb. beside: reads the files that it names."""
+    return scene_of(*_chunks(data), max_faces, beside)
 
 
-def read_gltf(data: bytes, max_faces: int) -> Content:
-    """Read a .gltf with its buffers inside. Raises MeshError where they are files of their own."""
-    return scene_of(data, b"", max_faces)
+def read_gltf(data: bytes, max_faces: int, beside: Beside) -> Content:
+    """Read a .gltf. beside: reads the files that it names."""
+    return scene_of(data, b"", max_faces, beside)
 
 
 def _chunks(data: bytes) -> tuple[bytes, bytes]:
@@ -58,13 +59,13 @@ def _chunks(data: bytes) -> tuple[bytes, bytes]:
     return found[b"JSON"], found.get(b"BIN\0", b"")
 
 
-def scene_of(text: bytes, binary: bytes, max_faces: int) -> Content:
-    """Return the triangles of a scene from its description, JSON, and the buffer beside it."""
+def scene_of(text: bytes, binary: bytes, max_faces: int, beside: Beside) -> Content:
+    """Return the triangles of a scene from its description, JSON, and the buffer that comes with it."""
     try:
         document = json.loads(text.decode("utf-8-sig"))
         if not isinstance(document, dict) or "asset" not in document:
             raise MeshError("is no glTF: its description has no asset; export it again")
-        scene = _Scene(document, binary, max_faces)
+        scene = _Scene(document, binary, max_faces, beside)
         with np.errstate(all="ignore"):  # what is not finite is refused later
             return scene.content()
     except (ValueError, KeyError, IndexError, TypeError, AttributeError, RecursionError, OverflowError) as error:
@@ -81,6 +82,7 @@ class _Scene:
     document: dict[str, Any]
     binary: bytes
     max_faces: int
+    beside: Beside
     points: list[Array] = field(default_factory=list)
     faces: list[IntArray] = field(default_factory=list)
     named: list[tuple[str, IntArray]] = field(default_factory=list)
@@ -173,17 +175,17 @@ class _Scene:
     def _buffer(self, number: int) -> bytes:
         if number not in self.buffers:
             uri = self.document["buffers"][number].get("uri")
-            self.buffers[number] = self.binary if uri is None else _embedded(uri)
+            if uri is None:
+                self.buffers[number] = self.binary
+            else:
+                self.buffers[number] = _embedded(uri) if uri.startswith("data:") else self.beside(uri)
         return self.buffers[number]
 
 
 def _embedded(uri: str) -> bytes:
-    """Return the bytes of a data URI; raise MeshError for a name of a file."""
-    head, _, body = uri.partition(",")
-    if not head.startswith("data:"):
-        raise MeshError(f"its arrays are in the file {uri!r:.60}: save it as .glb, which has them inside")
+    """Return the bytes of a data URI."""
     try:
-        return b64decode(body, validate=True)
+        return b64decode(uri.partition(",")[2], validate=True)
     except binascii.Error as error:
         raise MeshError(f"an array of the glTF is no base64 ({error}); {DAMAGED}") from None
 
