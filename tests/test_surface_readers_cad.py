@@ -1,18 +1,28 @@
-"""STEP and IGES by OpenCASCADE; without it one line says what to install."""
+"""STEP and IGES by OpenCASCADE; without it one line says what to install.
+
+data/bracket.step, made with OpenCASCADE 7.8: an L of a foot 60 x 40 x 10 and a wall 10 x 40 x 50, in millimetres, with
+a hole of radius 8 through the foot.
+"""
 
 from __future__ import annotations
 
 from math import pi
+from pathlib import Path
 
 import numpy as np
 import pytest
 from scene_files import solid_model
 
+import iga_nn
 from iga_nn.cli.commands import main
+from iga_nn.report import document as report
+from iga_nn.workflow.regions import check_regions
 from parameterize.surface.readers import cad
 from parameterize.surface.surface import MeshError, load_surface
 
 VOLUME = 6 * 4 * 1 + 1 * 4 * 4 + 0.5 * pi * 2**2  # foot, wall, half a disc at the end
+BRACKET = Path(__file__).parent / "data" / "bracket.step"
+BACK, FRONT, HOLE = "group:face1", "group:face8", "group:face9"
 NAMES = {"MM": "mm", "INCH": "in", "M": "m"}
 
 
@@ -33,6 +43,30 @@ def test_a_bracket_keeps_its_unit_and_its_faces(kind, unit, part, tmp_path):
     areas = [surface.part.area(faces) for faces in surface.groups.values()]
     assert sum(areas) == pytest.approx(surface.part.area(np.arange(len(surface.faces))))
     assert min(abs(np.array(areas) - 1 * 4)) < 1e-9  # the top of the wall
+
+
+def test_a_bracket_with_a_hole_has_a_handle_and_its_faces_by_name():
+    pytest.importorskip("OCP")
+    surface = load_surface(BRACKET)
+    assert surface.genus == 1 and surface.unit == "mm" and len(surface.groups) == 9
+    assert surface.volume == pytest.approx(60 * 40 * 10 + 10 * 40 * 40 - 10 * pi * 8**2, rel=1e-3)
+    areas = [surface.part.area(surface.groups[name.removeprefix("group:")]) for name in (BACK, FRONT, HOLE)]
+    assert areas == pytest.approx([40 * 50, 40 * 10, 2 * pi * 8 * 10], rel=2e-3)
+    check_regions(iga_nn.Elasticity(fix=BACK, load={FRONT: (0, 0, -1)}).on_surface(surface.part), surface)
+
+
+@pytest.mark.slow
+def test_a_bracket_with_a_hole_is_held_and_loaded_at_faces_by_name(in_folder):
+    """The wall holds what pulls at the front, 40 x 10 with one unit of force each."""
+    pytest.importorskip("OCP")
+    options = ["--young", "200", "--fix", BACK, "--load", f"{FRONT}=0;0;-1", "--control-points", "8", "--refine", "0"]
+    assert main(["run", "elasticity", str(BRACKET), *options, "--out", "out"]) == 0
+    found = report.read(in_folder / "out")
+    assert found["parameterization"]["bijective"] == "certified"
+    areas = {row["region"]: row["area"] for row in found["elasticity"]["regions"]}
+    assert areas[BACK] == pytest.approx(40 * 50, rel=0.05) and areas[FRONT] == pytest.approx(40 * 10, rel=0.05)
+    reaction = found["elasticity"]["levels"][0]["reactions"][f"fix {BACK!r}"]
+    assert reaction[2] == pytest.approx(areas[FRONT], rel=1e-6)
 
 
 def test_deflection_is_the_distance_from_curved_faces(part, tmp_path):
