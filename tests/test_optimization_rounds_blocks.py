@@ -1,5 +1,6 @@
 """The rounds on bodies of several blocks: thin starts of a torus and a double torus, drawn to their surfaces."""
 
+from collections import Counter
 from dataclasses import replace
 from functools import cache
 from types import SimpleNamespace
@@ -75,7 +76,7 @@ def test_the_edges_of_blocks_are_drawn_out_where_the_boundary_meets_itself():
     places.place(*far)
     assert energy.anchors.energy_and_gradient(start.control)[0] == 0.0
     misplaced = np.linalg.norm(energy.surface.residuals(start.control), axis=1)
-    Separate().begin(SimpleNamespace(energy=energy, spline=start, near=False, number=9))  # type: ignore[arg-type]
+    Separate().begin(SimpleNamespace(energy=energy, spline=start, near=False, number=9, rounds=Counter()))  # type: ignore[arg-type]
     assert energy.anchors.energy_and_gradient(start.control)[0] > 0.0
     assert np.linalg.norm(energy.surface.residuals(start.control), axis=1).max() < 0.2 * misplaced.max()
 

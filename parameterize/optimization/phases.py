@@ -140,13 +140,17 @@ class Separate(Phase):
     far: float = 0.01
 
     def begin(self, state: State) -> None:
-        """Let the surface's data give way where sheets of the boundary touch; with several blocks, place them anew."""
+        """Let the surface's data give way where sheets of the boundary touch.
+
+        Several blocks are drawn out by their anchors, and before the first round all places are found anew.
+        """
         energy, control = state.energy, state.spline.control
         energy.give_way(energy.watch_contact(control), _CONTACT_WAY)
         super().begin(state)
         if not energy.nets.one_cube:
             energy.anchors.aim(control, hold=True)
-            reassign(energy.surface, control, first=True)
+            if not state.rounds[self.name]:
+                reassign(energy.surface, control, first=True)
 
     def done(self, state: State) -> Reason | None:
         """Return a reason to end when the boundary no longer meets itself, or cannot be parted near the surface."""
