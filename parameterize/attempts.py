@@ -1,6 +1,7 @@
 """The starts, one after the other, until a map has no faults: the network, a cube that grows, an extended layout.
 
-A body with handles, and one with limbs, starts from blocks along its skeleton, one that planes bound from exact blocks.
+A body with handles, and one with limbs, starts from blocks along its skeleton, one that planes bound from exact blocks,
+a stack of extrusions from columns.
 """
 
 import logging
@@ -9,6 +10,7 @@ from .blocks.layout import LayoutError
 from .checkpoint import Checkpoints
 from .starts.blocks import BLOCKS
 from .starts.body import BODY
+from .starts.columns import COLUMNS
 from .starts.extension import EXTENSION
 from .starts.growth import GROWTH, LAST, STIFF
 from .starts.network import NETWORK
@@ -32,6 +34,8 @@ def starts_of(task: Task) -> tuple[Start, ...]:
         )
     if task.choice.division == "planes":
         return (PLANES,)
+    if task.choice.division == "columns":
+        return (COLUMNS,)
     if task.choice.division == "cube":
         return STARTS
     if task.choice.division == "body":

@@ -54,7 +54,7 @@ class Parameterization(Brief):
     quality : QualityReport
         What is measured; printed, a table.
     history : dict of str to array
-        Columns of equal length, one row a training step; empty for exact blocks.
+        Columns of equal length, one row a training step; empty for exact blocks and those of extrusions.
     seconds : dict of str to float
         Wall seconds of train, fit, optimize and certify, the last with quality, at the end: the certificates on the way
         count as optimize; with config.refinement, also those of refine. A map that is not trained has no train.
@@ -62,9 +62,9 @@ class Parameterization(Brief):
         Where the network was trained.
     seed : int
     config : Config
-    origin : "network", "growth", "extension", "blocks" or "planes"
+    origin : "network", "growth", "extension", "blocks", "planes" or "columns"
         Where the map comes from: the trained network, a cube that grew, an extended layout of the surface, blocks along
-        the skeleton, or exact blocks along the planes of the surface.
+        the skeleton, exact blocks along the planes of the surface, or blocks along the outlines of extrusions.
     attempts : tuple of AttemptReport
         The starts that were tried, in their order, with rounds and seconds by phase and the faults of their maps.
     refinement : Refinement or None

@@ -7,7 +7,7 @@ import pytest
 from plane_bodies import BODIES, arrays, prism
 
 import iga_nn
-from parameterize.attempts import PLANES, STARTS, starts_of
+from parameterize.attempts import COLUMNS, PLANES, STARTS, starts_of
 from parameterize.config import RefinementConfig, preset
 from parameterize.run import parameterize
 from parameterize.spline.multipatch import MultiPatch
@@ -51,9 +51,14 @@ def test_refinement_finds_nothing_to_do(few_distances):
     assert result.refinement.stopped == "tolerance met" and len(result.refinement.levels) == 1
 
 
-def test_a_tessellated_shaft_is_mapped_as_before():
+def test_a_tessellated_shaft_becomes_columns():
     surface = surface_from_arrays(*arrays(prism([(np.cos(t), np.sin(t)) for t in np.arange(80) * np.pi / 40], 2.0)))
-    assert starts_of(Task(surface, QUICK, 0, "cpu", "float32", None, {}, {})) == STARTS
+    assert starts_of(Task(surface, QUICK, 0, "cpu", "float32", None, {}, {})) == (COLUMNS,)
+    result = parameterize(surface, QUICK)
+    assert (result.origin, [one.ending for one in result.attempts]) == ("columns", ["laid"])
+    assert result.certificate.verdict == "certified" and result.quality.as_dict()["boundary_injective"]
+    assert result.division.startswith("a stack of extrusions: 5 blocks, within ")
+    assert result.quality.relative_distance.max < 3e-4  # what chords are off a circle of 80 corners
 
 
 def test_a_run_with_a_load_on_a_face(in_folder):

@@ -53,7 +53,8 @@ class MapOptions(SurfaceOptions):
             is large, for each direction apart, until it meets the tolerance or max_control_points is reached. Several
             blocks have a fifth as many spans across each, at least 4.
         blocks: 1 for one cube, a larger number for at most so many blocks, or "auto": exact blocks for a body that
-            planes bound, blocks along the skeleton for one with handles or limbs, one cube for the others.
+            planes bound, columns for a stack of extrusions, blocks along the skeleton for one with handles or
+            limbs, one cube for the others.
         corners: JSON file with a list of eight corners, in the order (0,0,0), (0,0,1), (0,1,0), ..., (1,1,1) of the
             cube's: points of three coordinates in the surface's units, or vertex numbers counted from 0; or an object
             {"XYZ": [...]} with eight points in X, Y, Z, scaled to volume 1 about the middle of the bounding box.

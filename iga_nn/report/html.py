@@ -42,6 +42,7 @@ ORIGINS = {
     "extension": ("the surface's layout on a cube", "extended into the solid without the network"),
     "blocks": ("blocks along the skeleton", "glued by whole faces, and drawn to the surface"),
     "planes": ("exact blocks", "along the planes of the surface"),
+    "columns": ("blocks", "along the outlines of extrusions"),
 }
 
 

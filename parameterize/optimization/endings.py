@@ -23,6 +23,7 @@ class Reason(StrEnum):
     TOO_MANY_FOLDED = "too many folded spans", "more spans are folded than can be watched one by one."
     TOO_FAR = "too far from the surface", "F is folded, and not close to the surface either."
     EXACT = "exact", "the blocks are the body, and nothing is left to optimise."
+    LAID = "laid", "the blocks follow the outlines of the body, and are left as they are."
     OUT_OF_ROUNDS = "out of rounds", "the stage has had all its rounds."
 
     def __new__(cls, name: str, sentence: str) -> "Reason":

@@ -93,15 +93,26 @@ def layout_of(found: Hexahedra, spans: int) -> BlockLayout:
     """
     rows = found.points[found.turned().corners]  # (k, 2, 2, 2, 3)
     plain = BlockLayout.from_blocks([_block(k, one, (1, 1, 1)) for k, one in enumerate(rows)])
-    knots = (open_uniform_knots(2, 1),) * 3
-    classes = np.concatenate(tied_spans(Nets(1, (knots,) * len(plain), plain.interfaces)))
     lengths = np.stack([np.linalg.norm(np.diff(rows, axis=1 + a), axis=-1).mean(axis=(1, 2, 3)) for a in range(3)], 1)
-    means = np.bincount(classes, lengths.ravel()) / np.bincount(classes)
-    step = _mean_edge(lengths) / spans
-    counts = np.clip(np.round(means / step), FEWEST_SPANS, _LONGEST * spans).astype(int)[classes].reshape(-1, 3)
+    counts = balanced_spans(plain, lengths, spans, np.full(lengths.shape, FEWEST_SPANS))
     pairs = zip(rows, counts.tolist(), strict=True)
     blocks = [_block(k, one, (u, v, w)) for k, (one, (u, v, w)) in enumerate(pairs)]
     return BlockLayout(tuple(blocks), plain.interfaces)
+
+
+def balanced_spans(plain: BlockLayout, lengths: Array, spans: int, fewest: IntArray) -> IntArray:
+    """Return the spans (k, 3) of blocks that are glued, in proportion to the mean lengths (k, 3) of their edges.
+
+    plain: the blocks with one span a direction. spans: of a cube as large as the mean block; along one direction there
+    are at most _LONGEST times as many. fewest: in each direction of each block (k, 3), where these are not more.
+    """
+    knots = (open_uniform_knots(2, 1),) * 3
+    classes = np.concatenate(tied_spans(Nets(1, (knots,) * len(plain), plain.interfaces)))
+    means = np.bincount(classes, lengths.ravel()) / np.bincount(classes)
+    least = np.zeros(len(means), dtype=int)
+    np.maximum.at(least, classes, fewest.ravel())
+    counts = np.clip(np.round(means / (_mean_edge(lengths) / spans)), least, _LONGEST * spans).astype(int)
+    return np.asarray(counts[classes].reshape(-1, 3))
 
 
 def _mean_edge(lengths: Array) -> float:

@@ -7,7 +7,7 @@ import numpy as np
 
 from .graph import Branch, Skeleton
 
-Division = Literal["blocks", "body", "cube", "planes"]
+Division = Literal["blocks", "body", "cube", "planes", "columns"]
 
 # Share of the volume in the balls around the curves. A square rod has .79, and a rod twice as wide as thick .39:
 TUBE_OF_LIMBS = 0.7  # without handles one cube is possible, and is left for a body that is nearly all limbs: bodies
@@ -25,7 +25,8 @@ class Choice:
     division : str
         "blocks" for blocks along all branches, "body" for one block with stubs on its faces where loops begin and end,
         "cube" for one block, that is a body without handles as it is mapped without a skeleton, "planes" for exact
-        blocks of a body that planes bound, whose skeleton is not looked for.
+        blocks of a body that planes bound, "columns" for blocks of a stack of extrusions; the skeleton of these is not
+        looked for.
     reason : str
         In words, with the figures that decide.
     """

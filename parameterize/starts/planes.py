@@ -36,15 +36,19 @@ class BoundedByPlanes(Start):
         """Return the attempt whose map is the task's exact layout. It takes seconds, and keeps no checkpoints."""
         layout = task.exact
         assert layout is not None, "this start follows where the choice is planes"
-        with timed(task.seconds, "fit"), one_blas_thread():
-            first = thin_blocks(layout, task.config.spline.degree)
-            fit = _surface_fit(task, first)
-        with timed(task.seconds, "optimize"), one_blas_thread():
-            found = Optimized.of(first)
-        return Attempt(found, Course(Counter(), {}, Reason.EXACT), fit, Weights())
+        return kept(task, thin_blocks(layout, task.config.spline.degree), Reason.EXACT)
 
 
 PLANES = BoundedByPlanes("planes", "planes", "laying exact blocks along the planes")
+
+
+def kept(task: Task, first: SplineMap, why: Reason) -> Attempt:
+    """Return the attempt whose map is left as it is made, and why."""
+    with timed(task.seconds, "fit"), one_blas_thread():
+        fit = _surface_fit(task, first)
+    with timed(task.seconds, "optimize"), one_blas_thread():
+        found = Optimized.of(first)
+    return Attempt(found, Course(Counter(), {}, why), fit, Weights())
 
 
 def _surface_fit(task: Task, first: SplineMap) -> SurfaceFit:

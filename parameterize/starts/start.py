@@ -11,6 +11,7 @@ from ..arrays import Array, IntArray, in_brackets
 from ..blocks.layout import SPANS, BlockLayout, LayoutError, block_layout
 from ..checkpoint import Checkpoints
 from ..coarse import coarse_knots, optimize_coarse_first
+from ..columns.layout import Columns, columns_of
 from ..config import Config, SplineConfig
 from ..cube.cutting import subdivide_finely
 from ..cube.layout import CubeLayout
@@ -40,7 +41,7 @@ FEWEST_SPANS = 4  # across a block: with fewer its section cannot become round
 COMPACT = 4.0  # cubed area of the surface over 36 pi, at volume 1: bodies with less have no long limbs, and most have
 # less, so that these need not wait for a skeleton
 _CELL = 0.03  # of the lattice whose points tell the areas of sections, at volume 1
-Origin = Literal["network", "growth", "extension", "blocks", "planes"]
+Origin = Literal["network", "growth", "extension", "blocks", "planes", "columns"]
 MOST_POINTS = (
     30_000  # added where long edges of the mesh are cut, else they are cut less finely: memory grows with them
 )
@@ -89,8 +90,9 @@ class Task:
     def choice(self) -> Choice:
         """Return whether one cube or several blocks suit the body, and why; the reason is "" where the options say it.
 
-        A body that planes bound gets exact blocks, where there are some; another one with handles gets blocks. The
-        skeleton of one without handles is looked for only where its surface is much larger than a ball's.
+        A body that planes bound gets exact blocks, where there are some, a stack of extrusions columns; another one
+        with handles gets blocks. The skeleton of one without handles is looked for only where its surface is much
+        larger than a ball's.
 
         Raises SkeletonError for a body with handles that has no skeleton.
         """
@@ -98,6 +100,14 @@ class Task:
         if self.exact is not None:
             count = len(self.exact)
             found = Choice("planes", f"bounded by planes: {count} exact block{'s' * (count > 1)}")
+            _log.info("%s", found.reason)
+            return found
+        if self.columns is not None:
+            count, off = len(self.columns), self.columns.off
+            blocks = f"{count} block{'s' * (count > 1)}"
+            found = Choice(
+                "columns", f"a stack of extrusions: {blocks}, within {off:.1e} of its outlines (over diagonal)"
+            )
             _log.info("%s", found.reason)
             return found
         if surface.genus == 0:
@@ -145,6 +155,16 @@ class Task:
             return found
         spans = spline.control_points - spline.degree
         return BlockLayout((replace(found.blocks[0], spans=(spans, spans, spans)),), ())
+
+    @cached_property
+    def columns(self) -> Columns | None:
+        """Return blocks of a stack of extrusions, at volume 1; None for other bodies, and for given corners."""
+        surface, spline, most = self.surface, self.config.spline, self.config.blocks
+        if self.given_corners is not None or len(surface.crossings):
+            return None
+        with timed(self.seconds, "fit"), one_blas_thread():
+            points = surface.to_unit(surface.vertices)
+            return columns_of(points, surface.faces, spans_across(spline.control_points), spline.degree, most)
 
     @cached_property
     def layout(self) -> BlockLayout:

@@ -14,7 +14,7 @@ class AttemptReport:
     ----------
     start : str
         The name of the start.
-    origin : "network", "growth", "extension", "blocks" or "planes"
+    origin : "network", "growth", "extension", "blocks", "planes" or "columns"
         The kind of start.
     ending : str
         Why its rounds ended.

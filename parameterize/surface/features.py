@@ -54,7 +54,7 @@ def features_of(vertices: Array, faces: IntArray, angle: float = SHARP) -> Featu
     for a, b in edges[sharp].tolist():
         around.setdefault(a, []).append(b)
         around.setdefault(b, []).append(a)
-    corners = {vertex for vertex, ends in around.items() if not _runs_on(vertices, vertex, ends, bend)}
+    corners = {vertex for vertex, ends in around.items() if not runs_on(vertices, vertex, ends, bend)}
     chains = [np.array(chain) for chain in _chains(around, corners)]
     lengths = np.array([np.linalg.norm(np.diff(vertices[chain], axis=0), axis=1).sum() for chain in chains])
     label = connected(edges[sharp], len(vertices))
@@ -68,8 +68,8 @@ def features_of(vertices: Array, faces: IntArray, angle: float = SHARP) -> Featu
     return Features(chosen, np.array(sorted(ends & corners), dtype=np.int64), lengths[kept])
 
 
-def _runs_on(vertices: Array, vertex: int, ends: list[int], bend: float) -> bool:
-    """Return whether two sharp edges, and no others, meet at a vertex and hardly turn there."""
+def runs_on(vertices: Array, vertex: int, ends: list[int], bend: float) -> bool:
+    """Return whether two edges, and no others, meet at a vertex and turn there by less than the angle of a cosine."""
     if len(ends) != 2:
         return False
     into, out = vertices[vertex] - vertices[ends[0]], vertices[ends[1]] - vertices[vertex]

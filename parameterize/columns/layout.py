@@ -1,0 +1,180 @@
+"""Makes the blocks of a stack of extrusions: columns over the quadrangles of its profiles, whose curves are splines."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..arrays import Array, IntArray
+from ..blocks.layout import Block, BlockLayout
+from ..certificate.body import certify
+from ..certificate.boundary import check_boundary
+from ..polyhedra.layout import FEWEST_SPANS, MOST_BLOCKS, balanced_spans
+from ..spline.bspline import greville, open_uniform_knots
+from ..spline.nets import Nets
+from ..spline.spline_map import SplineMap
+from ..surface.geometry import signed_volume
+from .curves import Curve, chains_of
+from .division import Division, division_of
+from .fit import deviation, fitted, needed_spans
+from .lines import lines_of
+from .network import Cutting, network_of
+from .regions import Region, regions_of
+from .stack import Stack, area_of, stack_of
+
+_GOOD = 0.3  # quality of a division after which no other cutting is tried
+_CUTTINGS = (Cutting(), Cutting(radial=True), Cutting(finer=2.0))
+_SAME = 1e-5  # relative: the volume of the blocks is that of the body, up to what lies between curves and their lines
+
+
+@dataclass(frozen=True, eq=False)
+class Columns:
+    """Blocks over a plane division, between the heights of a stack.
+
+    Attributes
+    ----------
+    layout : BlockLayout
+        The blocks with straight edges, and their spans.
+    spline : SplineMap
+        With the curves.
+    off : float
+        How far the curves are from the outlines of the surface at most, over the diagonal of its box.
+    """
+
+    layout: BlockLayout
+    spline: SplineMap
+    off: float
+
+    def __len__(self) -> int:
+        return len(self.layout)
+
+
+def columns_of(vertices: Array, faces: IntArray, spans: int, degree: int, most: int | None = None) -> Columns | None:
+    """Return blocks that fill a stack of extrusions, and are proved to be one-to-one; None where there are none.
+
+    vertices: (n, 3), faces: (m, 3), of a closed surface. spans: across a block that is a cube. most: blocks, at most.
+    """
+    stack = stack_of(vertices, faces)
+    if stack is None:
+        return None
+    diagonal, volume = float(np.linalg.norm(np.ptp(vertices, axis=0))), signed_volume(vertices, faces)
+    limit = MOST_BLOCKS if most is None else min(most, MOST_BLOCKS)
+    found = list(_divisions(stack, limit))
+    for division, regions in sorted(found, key=lambda row: row[0].cost):
+        if _fills(division, regions, stack, volume):
+            columns = _columns(division, regions, stack, spans, degree, diagonal)
+            if _is_proved(columns.spline):
+                return columns
+    return None
+
+
+def _divisions(stack: Stack, most: int) -> Iterator[tuple[Division, tuple[Region, ...]]]:
+    """Yield divisions of the profiles into columns, `most` blocks or fewer, until one is good."""
+    lines = lines_of(stack)
+    if lines is None:
+        return
+    corners, chains = chains_of(*lines)
+    for cutting in _CUTTINGS:
+        network = network_of(lines[0][corners], chains, cutting)
+        regions = regions_of(network, stack)
+        division = division_of(network, regions, most) if regions else None
+        if division is not None and regions:
+            division = division.smoothed()
+            yield division, regions
+            if division.quality > _GOOD:
+                return
+
+
+def _fills(division: Division, regions: tuple[Region, ...], stack: Stack, volume: float) -> bool:
+    """Return whether columns over quadrangles have a body's volume, up to what lies between curves and their lines."""
+    layers = np.array([np.diff(stack.heights)[list(region.solid)].sum() for region in regions])
+    total = between = 0.0
+    for (a, b, c, d), owner in zip(division.quads, division.owners, strict=True):
+        curves = [division.sides.get(edge) for edge in ((a, b), (b, c), (c, d), (d, a))]
+        rows = [c.samples if c is not None else division.points[[k]] for c, k in zip(curves, (a, b, c, d), strict=True)]
+        total += layers[owner] * area_of(np.concatenate(rows))
+        between += layers[owner] * sum(_between(curve) for curve in curves if curve is not None)
+    return abs(total - volume) <= between + _SAME * volume
+
+
+def _between(curve: Curve) -> float:
+    """Return the area between a curve and its polygonal line."""
+    return abs(area_of(np.concatenate([curve.samples, curve.points[::-1]])))
+
+
+def _columns(
+    division: Division, regions: tuple[Region, ...], stack: Stack, spans: int, degree: int, diagonal: float
+) -> Columns:
+    """Return the blocks over the quadrangles of a division."""
+    plan = [
+        (quad, layer)
+        for quad, owner in zip(division.quads, division.owners, strict=True)
+        for layer in np.flatnonzero(regions[owner].solid).tolist()
+    ]
+    blocks = [_block(k, division, stack, *one, (1, 1, 1)) for k, one in enumerate(plan)]
+    plain = BlockLayout.from_blocks(blocks)
+    lengths, fewest = np.empty((len(plan), 3)), np.full((len(plan), 3), FEWEST_SPANS)
+    needs = {edge: needed_spans(curve, degree, diagonal) for edge, curve in division.sides.items() if edge[0] < edge[1]}
+    for k, ((a, b, c, d), layer) in enumerate(plan):
+        lengths[k, 2] = stack.heights[layer + 1] - stack.heights[layer]
+        for axis, pair in enumerate((((a, b), (d, c)), ((a, d), (b, c)))):
+            lengths[k, axis] = np.mean([_length(division, edge) for edge in pair])
+            fewest[k, axis] = max(needs.get((min(edge), max(edge)), 1) for edge in pair)
+    counts = balanced_spans(plain, lengths, spans, fewest)
+    layout = replace(
+        plain, blocks=tuple(replace(one, spans=tuple(row)) for one, row in zip(blocks, counts.tolist(), strict=True))
+    )
+    knots = tuple(tuple(open_uniform_knots(degree + n, degree) for n in row) for row in counts.tolist())
+    nets = Nets(degree, knots, plain.interfaces)  # type: ignore[arg-type]
+    parts, off = [], 0.0
+    for ((a, b, c, d), layer), own in zip(plan, knots, strict=True):
+        edges = ((a, b), (d, c), (a, d), (b, c))
+        rows = [_side(division, edge, own[k // 2], degree) for k, edge in enumerate(edges)]
+        for edge, row, knot in zip(edges, rows, np.repeat(np.arange(2), 2), strict=True):
+            if edge in division.sides:
+                off = max(off, deviation(division.sides[edge], own[knot], degree, row))
+        flat = _coons(rows, *(greville(row, degree) for row in own[:2]))
+        low, high = stack.heights[layer : layer + 2]
+        heights = low + (high - low) * greville(own[2], degree)
+        across = flat @ stack.frame[:2]  # (n_u, n_v, 3)
+        parts.append(np.moveaxis(across[:, :, None] + heights[:, None] * stack.frame[2], -1, 0))
+    return Columns(layout, SplineMap(nets, nets.merged(nets.joined(parts))), off / diagonal)
+
+
+def _block(
+    number: int, division: Division, stack: Stack, quad: tuple[int, ...], layer: int, spans: tuple[int, int, int]
+) -> Block:
+    """Return the column over a quadrangle between two heights, with straight edges."""
+    a, b, c, d = division.points[list(quad)] @ stack.frame[:2]
+    flat = np.array([[a, d], [b, c]])
+    sections = np.stack([flat + height * stack.frame[2] for height in stack.heights[layer : layer + 2]])
+    return Block(f"column {number}", sections, spans)
+
+
+def _length(division: Division, edge: tuple[int, int]) -> float:
+    curve = division.sides.get(edge)
+    return curve.length if curve is not None else float(np.linalg.norm(np.diff(division.points[list(edge)], axis=0)))
+
+
+def _side(division: Division, edge: tuple[int, int], knots: Array, degree: int) -> Array:
+    """Return the control points (n, 2) of a side, the same in both directions."""
+    curve = division.sides.get(edge)
+    if curve is None:
+        share = greville(knots, degree)[:, None]
+        return (1.0 - share) * division.points[edge[0]] + share * division.points[edge[1]]
+    if edge[0] > edge[1]:
+        return fitted(division.sides[edge[::-1]], knots, degree)[::-1]
+    return fitted(curve, knots, degree)
+
+
+def _coons(rows: list[Array], u: Array, v: Array) -> Array:
+    """Return the control points (n_u, n_v, 2) of a Coons patch between those of v = 0, v = 1, u = 0 and u = 1."""
+    low, high, left, right = rows
+    s, t = u[:, None, None], v[None, :, None]
+    ruled = (1 - t) * low[:, None] + t * high[:, None] + (1 - s) * left[None] + s * right[None]
+    return ruled - (1 - s) * ((1 - t) * low[0] + t * high[0]) - s * ((1 - t) * low[-1] + t * high[-1])
+
+
+def _is_proved(spline: SplineMap) -> bool:
+    """Return whether blocks are certified and their boundary is proved not to meet itself."""
+    return certify(spline.body).verdict == "certified" and check_boundary(spline.body).injective is True
