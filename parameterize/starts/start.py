@@ -43,7 +43,8 @@ FEWEST_SPANS = 4  # across a block: with fewer its section cannot become round
 COMPACT = 4.0  # cubed area of the surface over 36 pi, at volume 1: bodies with less have no long limbs, and most have
 # less, so that these need not wait for a skeleton
 _CELL = 0.03  # of the lattice whose points tell the areas of sections, at volume 1
-FEW_RIDGES = 2.0  # length, at volume 1: less is an eye or a mouth; the rim of a half ball has 5, a cube 12
+FEW_EDGES = 4.0  # length at volume 1 of sharp edges: less is an eye or a mouth; the rim of a half ball has 5, a cube 12
+PIECE = 0.25  # length at volume 1: a coarse mesh of a smooth body has sharp edges in shorter pieces
 Origin = Literal["network", "growth", "extension", "blocks", "planes"]
 MOST_POINTS = (
     30_000  # added where long edges of the mesh are cut, else they are cut less finely: memory grows with them
@@ -160,10 +161,13 @@ class Task:
 
     @cached_property
     def ridges(self) -> Ridges | None:
-        """Return the ridges of the surface, at volume 1; None where they are few."""
+        """Return the ridges of the surface, at volume 1; None where its sharp edges are few or short."""
         vertices, faces = self.surface.unit_vertices, self.surface.faces
-        found = Ridges.of(features_of(vertices, faces, self.surface.sharp), vertices, faces)
-        return found if found.length >= FEW_RIDGES else None
+        found = features_of(vertices, faces, self.surface.sharp)
+        if found.lengths[found.lengths > PIECE].sum() < FEW_EDGES:
+            return None
+        ridges = Ridges.of(found, vertices, faces)
+        return ridges if len(ridges.segments) else None
 
     @cached_property
     def sphere(self) -> CubeLayout:
