@@ -18,8 +18,8 @@ def test_the_inner_edge_of_an_L_is_no_ridge():
     ridges, found, _ = ridges_of("L")
     assert (len(found), len(ridges.lengths)) == (18, 17)
     assert len(ridges.corners) == 12
-    inner = set(np.flatnonzero(np.bincount(ridges.links.ravel(), minlength=12) == 2))
-    assert len(inner) == 2 and ridges.length == pytest.approx(found.lengths.sum() - found.lengths.min(), rel=0.2)
+    a, b = ridges.corners[np.bincount(ridges.links.ravel(), minlength=12) == 2]  # three edges meet at the others
+    assert ridges.lengths.sum() == pytest.approx(found.lengths.sum() - np.linalg.norm(b - a))
 
 
 def test_points_and_mesh_edges_on_ridges_are_told_from_others():
@@ -29,8 +29,6 @@ def test_points_and_mesh_edges_on_ridges_are_told_from_others():
     assert ridges.hold(points).tolist() == [True, True, True, False]
     assert ridges.end_at(points).tolist() == [True, True, False, False]
     assert ridges.along(points, np.array([[0, 2], [2, 1], [0, 3]])).tolist() == [True, True, False]
-    along = ridges.directions(points)
-    assert np.abs(along[2] @ (b - a)) == pytest.approx(np.linalg.norm(b - a)) and not along[3].any()
 
 
 def test_an_edge_between_two_ridges_is_not_on_one():

@@ -1,6 +1,6 @@
-"""Holds the ridges of a surface: the sharp edges along which it bends outwards, which an edge of a block can carry.
+"""Holds the ridges of a surface: the sharp edges along which it bends outwards, which an edge of the cube can carry.
 
-In a hollow the solid fills more than half of the space around, and det J > 0 allows no edge of one block there.
+In a hollow the solid fills more than half of the space around, and det J > 0 allows no edge of the cube there.
 """
 
 from dataclasses import dataclass
@@ -39,32 +39,17 @@ class Ridges:
         links = np.searchsorted(found.corners, ends[between])
         return cls(segments, vertices[found.corners], links, found.lengths[chosen][between])
 
-    @property
-    def length(self) -> float:
-        """Return the length of all ridges."""
-        return float(np.linalg.norm(self.segments[:, 1] - self.segments[:, 0], axis=1).sum())
-
-    def _nearest(self, points: Array) -> tuple[Mask, IntArray]:
-        """Return whether points (n, 3) lie on a ridge, and their nearest segments, (n,) each."""
-        ends = np.ascontiguousarray(self.segments.reshape(-1, 3))
-        squared, nearest, _ = igl.point_mesh_squared_distance(points, ends, np.arange(len(ends)).reshape(-1, 2))
-        return np.asarray(squared).ravel() < _ON**2, np.asarray(nearest).ravel()
-
     def hold(self, points: Array) -> Mask:
         """Return whether points (n, 3) lie on a ridge, (n,)."""
-        return self._nearest(points)[0]
+        ends = np.ascontiguousarray(self.segments.reshape(-1, 3))
+        squared = igl.point_mesh_squared_distance(points, ends, np.arange(len(ends)).reshape(-1, 2))[0]
+        return np.asarray(np.asarray(squared).ravel() < _ON**2)
 
     def end_at(self, points: Array) -> Mask:
         """Return whether points (n, 3) are corners, (n,)."""
         if not len(self.corners):
             return np.zeros(len(points), dtype=bool)
         return np.asarray(np.linalg.norm(points[:, None] - self.corners, axis=2).min(axis=1) < _ON)
-
-    def directions(self, points: Array) -> Array:
-        """Return unit vectors (n, 3) along the ridges on which points (n, 3) lie, zero for other points."""
-        on, nearest = self._nearest(points)
-        a, b = self.segments[nearest].swapaxes(0, 1)
-        return np.asarray(on[:, None] * (b - a) / np.linalg.norm(b - a, axis=1)[:, None])
 
     def along(self, points: Array, edges: IntArray) -> Mask:
         """Return whether mesh edges (e, 2) between points (n, 3) lie on ridges, (e,)."""
