@@ -16,21 +16,23 @@ from ..surface.ridges import Ridges
 from .cube import CORNERS, EDGES, axis_and_side, face_number, nearest_faces
 from .layout import CubeLayout
 
-_OFF_CORNER, _OFF_RIDGE = 0.25, 0.85  # by which a corner on a ridge, or off all, counts as farther away on the cube
+OFF_RIDGES = (0.85, 1.5)  # by which a corner off all ridges counts as farther away on the cube: the usual, and for rims
+# that are far from the corners, such as the small one of a cone
+_OFF_CORNER = 0.25  # by which one on a ridge does
 _TRIED = 6  # corners of sharp edges near each corner of the cube
 _MOVE = 1.0  # length of ridges, at volume 1, that is worth a corner's squared distance 1 on the cube
 
 
-def choose_sharp_corners(layout: CubeLayout, ridges: Ridges) -> IntArray:
+def choose_sharp_corners(layout: CubeLayout, ridges: Ridges, off_ridge: float = OFF_RIDGES[0]) -> IntArray:
     """Return eight different vertices (8,) for the cube's corners: near these on the cube, on corners of sharp edges.
 
-    A vertex elsewhere on a ridge, and more so one off all ridges, has to be nearer. Then corners move to others of
-    sharp edges, one by one or two at a time, where edges of the cube follow more ridges.
+    A vertex elsewhere on a ridge, and more so one off all ridges, by `off_ridge`, has to be nearer. Then corners move
+    to others of sharp edges, one by one or two at a time, where edges of the cube follow more ridges.
     """
     gaps = np.linalg.norm(layout.places[:, None] - CORNERS, axis=2)  # (n, 8)
     on = np.flatnonzero(ridges.hold(layout.points))
     ends = np.array([np.linalg.norm(layout.points - corner, axis=1).argmin() for corner in ridges.corners], dtype=int)
-    extra = np.full(len(gaps), _OFF_RIDGE)
+    extra = np.full(len(gaps), off_ridge)
     extra[on] = _OFF_CORNER
     extra[ends] = 0.0
     cost = gaps + extra[:, None]
@@ -73,12 +75,13 @@ def _improved(chosen: IntArray, ends: IntArray, length: Array, gaps: Array) -> I
 class Carried:
     """Say which points of a layout on the cube slide along the cube's edges alone.
 
-    fixed: (n, 3), the parameters that points keep. faces: (n,), the face of the cube on which they slide. share: of the
-    length of the cube's edges on the surface, that on ridges.
+    fixed: (n, 3), the parameters that points keep. faces: (n,), the face of the cube on which they slide. length: of
+    the cube's edges on ridges. share: of the length of all its edges on the surface.
     """
 
     fixed: Mask
     faces: IntArray
+    length: float
     share: float
 
 
@@ -105,4 +108,5 @@ def carried(layout: CubeLayout, ridges: Ridges) -> Carried:
             fixed[own] = np.arange(3) == axis
             others = np.where(at_side[own] & (np.arange(3) != axis), np.arange(3), -1).max(axis=1)
             faces[own] = face_number(others, places[own, others].astype(np.int64))
-    return Carried(fixed, faces, float(lengths[on].sum() / lengths.sum()))
+    length = float(lengths[on].sum())
+    return Carried(fixed, faces, length, length / float(lengths.sum()))

@@ -7,13 +7,15 @@ and rounds the sharp edges; here points of sharp edges lie on the cube's edges f
 import logging
 from dataclasses import dataclass, replace
 
+from ..arrays import IntArray
 from ..checkpoint import Checkpoints
-from ..cube.carried import Carried, carried, choose_sharp_corners
+from ..cube.carried import OFF_RIDGES, Carried, carried, choose_sharp_corners
 from ..cube.cube import snap
 from ..cube.edge_paths import PathError, lay_out
 from ..cube.layout import CubeLayout
 from ..extension import extended
 from ..progress import timed
+from ..surface.ridges import Ridges
 from ..threads import one_blas_thread
 from .extension import CELL, schedule
 from .first_spline import COARSE, first_spline
@@ -54,14 +56,29 @@ def _along_ridges(task: Task) -> tuple[CubeLayout, Carried] | None:
     assert ridges is not None  # else this start is not among those of the body
     for turn in range(_TURNS):
         layout = surface_on_cube(task, turn)
-        try:
-            given = task.given_corners
-            laid = lay_out(layout, choose_sharp_corners(layout, ridges) if given is None else given, ridges)
-        except PathError as error:
-            _log.info("turn %d of the cube: %s", turn, error)
-            continue
-        laid = replace(laid, places=snap(laid.places))
-        kept = carried(laid, ridges)
-        _log.info("the cube's edges follow ridges along %.0f %% of their length", 100.0 * kept.share)
-        return (laid, kept) if kept.share >= _LEAST_SHARE else None
+        found = [_laid_out(layout, corners, ridges) for corners in _corners(layout, ridges, task.given_corners)]
+        if laid := [one for one in found if one is not None]:
+            best = max(laid, key=lambda one: one[1].length)
+            share = best[1].share
+            _log.info("turn %d of the cube: its edges follow ridges along %.0f %% of their length", turn, 100.0 * share)
+            return best if share >= _LEAST_SHARE else None
     return None
+
+
+def _corners(layout: CubeLayout, ridges: Ridges, given: IntArray | None) -> list[IntArray]:
+    """Return choices of corners (8,): those that the user gives; else others, too, where one is off all ridges."""
+    if given is not None:
+        return [given]
+    usual, farther = (choose_sharp_corners(layout, ridges, off) for off in OFF_RIDGES)
+    return [usual] if ridges.hold(layout.points[usual]).all() else [usual, farther]
+
+
+def _laid_out(layout: CubeLayout, corners: IntArray, ridges: Ridges) -> tuple[CubeLayout, Carried] | None:
+    """Return the layout with these corners (8,), and what the cube's edges carry; None where they find no paths."""
+    try:
+        laid = lay_out(layout, corners, ridges)
+    except PathError as error:
+        _log.info("%s", error)
+        return None
+    laid = replace(laid, places=snap(laid.places))
+    return laid, carried(laid, ridges)
