@@ -2,12 +2,13 @@
 
 import os
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
 from parameterize.surface.bodies import Choice
+from parameterize.surface.features import SHARP
 from parameterize.surface.holes import Close
 from parameterize.surface.surface import MAX_FACES, MeshError, Surface, load_surface, surface_from_arrays
 
@@ -43,28 +44,36 @@ def resolve(
     deflection: float | None = None,
     max_faces: int = MAX_FACES,
     decimate: bool = False,
+    sharp: float = SHARP,
 ) -> Surface:
     """Return the surface that MESH names: a file, else a sample, else a model in the folder IGA_NN_DATA.
 
     component, close, deflection, max_faces: as in load_surface. decimate: reduce a larger surface, of at most MOST_READ
     faces, to max_faces instead of refusing it; where max_faces is MAX_FACES, as by default, that is done anyway, with a
-    notice. Raises MeshError with the way to get a missing file.
+    notice. sharp: the angle in degrees above which an edge counts as sharp. Raises MeshError with the way to get a
+    missing file, and InputError for an angle that is not between 0 and 180.
     """
+    if not 0.0 < sharp < 180.0:
+        raise InputError(f"sharp {sharp:g}: must be an angle between 0 and 180 degrees")
     how: dict[str, Any] = {"component": component, "close": close, "deflection": deflection}
     if decimate or max_faces == MAX_FACES:
         from parameterize.surface import decimation
 
-        larger = resolve(name, max_faces=max(max_faces, MOST_READ), **how)
-        return decimation.decimate(larger, max_faces)
-    asked = {**how, "max_faces": max_faces}
+        larger = _found(name, {**how, "max_faces": max(max_faces, MOST_READ)})
+        return replace(decimation.decimate(larger, max_faces), sharp=sharp)
+    return replace(_found(name, {**how, "max_faces": max_faces}), sharp=sharp)
+
+
+def _found(name: str, asked: dict[str, Any]) -> Surface:
+    """Return the surface of that name. asked: the keywords of load_surface."""
     if not name:
         raise MeshError("no surface is named: give a file, or one of the samples " + ", ".join(SAMPLES))
     if Path(name).is_file():
         return load_surface(name, **asked)
     if name in SAMPLES:  # before folders: the results of a sample are in a folder of its name
-        if deflection is not None:
+        if asked.pop("deflection") is not None:
             raise MeshError(f"{name}: deflection is for files of solid models: leave --deflection out")
-        return surface_from_arrays(*SAMPLES[name](), name, component=component, close=close, max_faces=max_faces)
+        return surface_from_arrays(*SAMPLES[name](), name, **asked)
     if found := _in_data_folder(name):
         return load_surface(found, **asked)
     if Path(name).exists() and Path(name).name.split(".")[0] not in MODELS:

@@ -15,6 +15,7 @@ from .starts.extension import EXTENSION
 from .starts.growth import GROWTH, LAST, STIFF
 from .starts.network import NETWORK
 from .starts.planes import PLANES
+from .starts.sharp import SHARP
 from .starts.start import Start, Task
 from .starts.tried import Tried
 
@@ -37,7 +38,7 @@ def starts_of(task: Task) -> tuple[Start, ...]:
     if task.choice.division == "columns":
         return (COLUMNS,)
     if task.choice.division == "cube":
-        return STARTS
+        return (SHARP, *STARTS) if task.config.starts > 1 and task.ridges is not None else STARTS
     if task.choice.division == "body":
         return (BODY, BLOCKS)
     return (BLOCKS,) if task.surface.genus or task.config.blocks is not None else (BLOCKS, *STARTS)
@@ -59,8 +60,13 @@ def next_start(tried: tuple[Tried, ...], starts: tuple[Start, ...]) -> Start | N
 
 
 def _serves(one: Tried) -> bool:
-    """Return whether a map has no faults, and, where it has blocks, is close to the surface: one cube may be closer."""
+    """Return whether a map has no faults, and, where it has blocks, is close to the surface: one cube may be closer.
+
+    Of a map with its edges on sharp edges it is also proved that the boundary does not meet itself.
+    """
     if one.attempt is None or any(one.attempt.found.faults):
+        return False
+    if one.start is SHARP and one.attempt.found.injective is None:
         return False
     return one.start is not BLOCKS or one.attempt.distance <= GROWTH.far
 
@@ -69,7 +75,7 @@ def attempts(task: Task, checkpoints: Checkpoints) -> tuple[Tried, ...]:
     """Make maps until one has no faults, at most as many as the options say; return all, with at least one map."""
     tried: tuple[Tried, ...] = ()
     starts = starts_of(task)
-    most = task.most_starts + starts.count(BLOCKS)
+    most = task.most_starts + starts.count(BLOCKS) + starts.count(SHARP)
     while len(tried) < most and (start := next_start(tried, starts)) is not None:
         if tried:
             _tell(tried[-1], start)

@@ -199,7 +199,7 @@ def parameterize(
     with timed(seconds, "certify"):
         certificate = certify(volume)  # of the volume in the user's units: bringing it there rounds
         proofs = certificate, check_boundary(volume)
-        quality = measure(volume, surface.vertices, surface.faces, surface.scale, boundary, *proofs)
+        quality = measure(volume, surface.vertices, surface.faces, surface.scale, boundary, *proofs, surface.sharp)
     return Parameterization(
         volume=volume,
         boundary=boundary,
@@ -233,6 +233,7 @@ def identity_of(
     """
     return {
         "surface": hashlib.sha256(surface.vertices.tobytes() + surface.faces.tobytes()).hexdigest(),
+        "sharp": surface.sharp,
         "config": asdict(config),
         "seed": seed,
         "device": device,

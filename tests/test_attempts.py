@@ -8,7 +8,7 @@ import pytest
 from small_run import small_surface, tiny_config
 
 from parameterize import attempts
-from parameterize.attempts import BLOCKS, EXTENSION, GROWTH, LAST, NETWORK, STARTS, STIFF, next_start, starts_of
+from parameterize.attempts import BLOCKS, EXTENSION, GROWTH, LAST, NETWORK, SHARP, STARTS, STIFF, next_start, starts_of
 from parameterize.blocks.layout import LayoutError
 from parameterize.optimization.endings import Course, Reason
 from parameterize.run import parameterize
@@ -69,8 +69,27 @@ def test_the_start_that_follows(before, following):
     ],
 )
 def test_bodies_with_handles_or_limbs_start_from_blocks(genus, blocks, division, first):
-    options = {"surface": SimpleNamespace(genus=genus), "config": SimpleNamespace(blocks=blocks)}
+    options = {
+        "surface": SimpleNamespace(genus=genus),
+        "config": SimpleNamespace(blocks=blocks, starts=5),
+        "ridges": None,
+    }
     assert starts_of(SimpleNamespace(**options, choice=SimpleNamespace(division=division))) == first
+
+
+@pytest.mark.parametrize(("most", "first"), [(5, (SHARP, *STARTS)), (1, STARTS)])
+def test_a_body_with_ridges_first_has_the_edges_of_its_cube_on_them(most, first):
+    choice, config = SimpleNamespace(division="cube"), SimpleNamespace(blocks=None, starts=most)
+    task = SimpleNamespace(surface=SimpleNamespace(genus=0), config=config, choice=choice, ridges=object())
+    assert starts_of(task) == first
+
+
+def test_a_map_on_ridges_whose_boundary_is_undecided_has_a_follower():
+    one = tried(SHARP)
+    one.attempt.found.injective = None
+    assert next_start((one,), (SHARP, *STARTS)) is NETWORK
+    one.attempt.found.injective = True
+    assert next_start((one,), (SHARP, *STARTS)) is None
 
 
 def test_where_no_blocks_fit_a_body_without_handles_one_cube_is_tried():

@@ -53,7 +53,7 @@ def test_volumes_are_those_of_the_formulas():
 
 
 def test_a_surface_is_written_with_every_digit(tmp_path):
-    catalogue.write_shape("frame", tmp_path / "frame.obj")
+    catalogue.write("frame", catalogue.SHAPES["frame"], tmp_path / "frame.obj")
     lines = (tmp_path / "frame.obj").read_text().splitlines()
     vertices, faces = catalogue.SHAPES["frame"].triangles()
     assert lines[0] == "# frame: 40 vertices, 96 faces, genus 5"

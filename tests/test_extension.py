@@ -13,6 +13,7 @@ from parameterize import attempts, parameterize
 from parameterize.config import preset
 from parameterize.cube.layout import CubeLayout
 from parameterize.extension import extended
+from parameterize.starts.start import Task
 from parameterize.surface.surface import surface_from_arrays
 
 CELL = 0.07
@@ -90,6 +91,7 @@ def sheet_folded_once(count=900):
 def test_a_sheet_folded_once_is_certified_by_extension(caplog, few_distances, monkeypatch):
     monkeypatch.setattr(attempts, "STARTS", (attempts.NETWORK, attempts.EXTENSION))
     monkeypatch.setattr("parameterize.starts.extension.CELL", CELL)
+    monkeypatch.setattr(Task, "ridges", None)  # the coarse mesh has a sharp rim
     config = tiny_config()
     config = replace(
         config,

@@ -230,3 +230,13 @@ def test_a_surface_above_the_default_limit_is_reduced_with_a_notice(monkeypatch,
     assert len(surface.faces) <= 2000 and surface.notices[0].startswith("decimated from 4996 to 2000 faces: moved by")
     with pytest.raises(MeshError, match="4996 faces, more than max_faces=1000"):
         resolve("bean", max_faces=1000)
+
+
+def test_the_angle_of_sharp_edges_is_the_users():
+    assert len(resolve("cube").features) == 12
+    blunt = resolve("cube", sharp=95.0)
+    assert blunt.sharp == 95.0 and len(blunt.features) == 0
+    assert blunt.summary()["sharp_edges"]["edges"] == 0
+    for angle in (0.0, 180.0):
+        with pytest.raises(InputError, match="must be an angle between 0 and 180 degrees"):
+            resolve("cube", sharp=angle)

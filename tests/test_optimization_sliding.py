@@ -144,3 +144,28 @@ def test_a_relaxation_that_leaves_flips_is_dropped(monkeypatch):
     found = places.at_closest_points(control, as_volume(control)(tangled), 2, 5)
     assert flipped(tangled, triangles).any()
     assert np.allclose(found.parameters, tangled)
+
+
+def test_a_fixed_parameter_stays_and_the_point_slides_along_its_edge():
+    control = wavy_control()
+    volume = as_volume(control)
+    start = np.array([[0.3, 1.0, 1.0], [0.4, 0.0, 1.0], [0.5, 1.0, 0.3]])
+    goal = np.array([[0.5, 1.0, 1.0], [0.2, 0.0, 1.0], [0.5, 1.0, 0.6]])
+    fixed = np.array([[0, 1, 1], [0, 1, 1], [1, 0, 0]], dtype=bool)
+    places = SlidingParameters(NETS, start, np.array([3, 2, 3]), fixed=fixed)
+    for _ in range(20):
+        places.slide(control, volume(goal) + [0.0, 0.02, 0.02])
+    assert np.array_equal(places.parameters[fixed], start[fixed])
+    assert np.abs(places.parameters - goal).max() < 0.05
+
+
+def test_a_point_on_an_edge_that_carries_it_stops_at_the_corner():
+    fixed = np.array([[False, True, True]])
+    ended = fold_over_edges(NETS, np.array([[1.1, 1.0, 1.0]]), np.array([3]), fixed)
+    assert ended[0].tolist() == [[1.0, 1.0, 1.0]] and ended[1].tolist() == [3]
+
+
+def test_a_point_on_a_rim_passes_the_corner():
+    fixed = np.array([[False, False, True]])
+    parameters, faces = fold_over_edges(NETS, np.array([[1.1, 1.0, 1.0]]), np.array([3]), fixed)
+    assert parameters[0] == pytest.approx([1.0, 0.9, 1.0]) and faces.tolist() == [1]

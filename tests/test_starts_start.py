@@ -49,12 +49,12 @@ def test_a_fat_body_with_thin_handles_gets_stubs_and_blocks_where_these_fail(mon
 def test_a_compact_body_gets_one_cube_without_a_skeleton(monkeypatch, caplog):
     caplog.set_level(logging.INFO)
     monkeypatch.setattr(start, "skeleton_of", lambda *_: pytest.fail("no skeleton is needed"))
-    task = task_of(preset("fast"), body=rounded_cube(200))
+    task = task_of(preset("fast"), body=rounded_cube(200, 2.0))
     assert starts_of(task) == STARTS and "a compact body" in task.choice.reason and not caplog.messages
 
 
 def test_where_the_options_say_it_nothing_is_chosen():
-    body = rounded_cube(200)
+    body = rounded_cube(200, 2.0)
     for config, corners, starts in (
         (preset("fast").with_blocks(1), None, STARTS),
         (preset("fast").with_blocks(5), None, (BLOCKS,)),

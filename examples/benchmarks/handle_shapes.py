@@ -98,10 +98,10 @@ LIMBS = {
 SHAPES = HANDLES | KNOTTED | EVERYDAY | LIMBS
 
 
-def write_shape(name: str, path: Path) -> None:
-    """Write the surface of that name as OBJ, with every digit of its coordinates."""
-    vertices, faces = SHAPES[name].triangles()
-    rows = [f"# {name}: {len(vertices)} vertices, {len(faces)} faces, genus {SHAPES[name].genus}"]
+def write(name: str, shape: Shape, path: Path) -> None:
+    """Write a surface as OBJ under a name, with every digit of its coordinates."""
+    vertices, faces = shape.triangles()
+    rows = [f"# {name}: {len(vertices)} vertices, {len(faces)} faces, genus {shape.genus}"]
     rows += [f"v {x!r} {y!r} {z!r}" for x, y, z in vertices.tolist()]
     rows += [f"f {a} {b} {c}" for a, b, c in (faces + 1).tolist()]
     save_text(path, "\n".join(rows) + "\n")
@@ -111,7 +111,7 @@ def compute_named(task: Task, number: int, batch: str) -> Ended:
     """Make the surface that `task` names where its mesh is not there; then compute it, measured."""
     try:
         if not Path(task.mesh).is_file():
-            write_shape(task.name, Path(task.mesh))
+            write(task.name, SHAPES[task.name], Path(task.mesh))
     except MeshError as error:
         return Ended("refused", str(error))
     return compute_measured(task, number, batch)
@@ -121,5 +121,5 @@ if __name__ == "__main__":
     folder = Path(sys.argv[1])
     folder.mkdir(parents=True, exist_ok=True)
     for name in SHAPES:
-        write_shape(name, folder / f"{name}.obj")
+        write(name, SHAPES[name], folder / f"{name}.obj")
         print(folder / f"{name}.obj")

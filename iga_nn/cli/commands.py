@@ -273,8 +273,8 @@ def check(
         _print(reports.as_json(facts) if as_json else "accepted\n" + answer.surface_in_words(facts))
         return DONE
     if surface != SurfaceOptions() or strict or region or picture:
-        options = "--component, --close, --deflection, --max-faces, --decimate, --strict, --region and --picture"
-        raise InputError(f"{path}: is a volume; {options} are for surfaces")
+        options = "--component, --close, --deflection, --max-faces, --decimate, --sharp, --strict, --region"
+        raise InputError(f"{path}: is a volume; {options} and --picture are for surfaces")
     facts = certified_facts(load_volume(path))
     _print(reports.as_json(facts) if as_json else answer.volume_in_words(facts))
     return DONE if reports.is_certified({"parameterization": facts}) else NOT_CERTIFIED

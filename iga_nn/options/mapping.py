@@ -27,6 +27,8 @@ class SurfaceOptions(Checked):
             file's unit; a thousandth of the box's diagonal by default.
         max_faces: refuse surfaces with more faces; where it is not given, reduce them to 500 000, as decimate does.
         decimate: reduce surfaces with more faces to max_faces instead; a notice has the distance from the original.
+        sharp: an edge is sharp where its triangles meet at more than so many degrees; edges of the cube and of blocks
+            follow sharp edges.
     """
 
     component: int | Literal["largest"] | None = None
@@ -34,6 +36,7 @@ class SurfaceOptions(Checked):
     deflection: float | None = None
     max_faces: int = 500_000
     decimate: bool = False
+    sharp: float = 40.0
 
     def reading(self) -> dict[str, Any]:
         """Return the keywords of `models.resolve`."""

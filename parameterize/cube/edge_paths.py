@@ -16,12 +16,14 @@ from scipy.sparse.linalg import splu
 
 from ..arrays import Array, IntArray, Mask
 from ..surface.geometry import connected, directed_edges, edge_table, edge_triangles
+from ..surface.ridges import Ridges
 from .cube import CORNERS, EDGES, axis_and_side, face_number, project_radially, tangent_axes
 from .cutting import cut_along_rays, split_edges
 from .layout import CubeLayout
 
 _STRAY = 20.0  # extra cost of a path, relative to its length, at the distance _STRAY_DISTANCE from its cube edge
 _STRAY_DISTANCE = 0.05
+_FOLLOWED = 0.01  # of its cost, that of a path along a ridge: it may stray by a quarter of the cube's side
 _ORDERS = 24  # orders in which the twelve paths are traced before the surface is given up: twice one for each path
 _FLAT = 1e-12  # doubled area on the square up to which a triangle counts as turned over
 _TINY = 1e-12  # least length, and least 1 + cosine and 1 - cosine, in half tangents
@@ -52,14 +54,14 @@ def choose_corners(mapped: Array) -> IntArray:
     return candidates[rows[np.argsort(columns)]]
 
 
-def cut_surface(layout: CubeLayout, corners: IntArray) -> CubeSurface:
+def cut_surface(layout: CubeLayout, corners: IntArray, ridges: Ridges | None = None) -> CubeSurface:
     """Return a surface with places close to the cube's boundary, cut along paths between its corners, vertices (8,).
 
-    Raises PathError where the paths do not bound six discs, which happens only far from a cube, or where the corners
-    have the order of a mirrored cube.
+    ridges: those that paths follow where they lead the same way. Raises PathError where the paths do not bound
+    six discs, which happens only far from a cube, or where the corners have the order of a mirrored cube.
     """
     cut = cut_along_rays(layout.places, layout.faces).laid_out(layout)
-    paths = _trace_paths(cut.places, cut.faces, corners)
+    paths = _trace_paths(cut, corners, ridges)
     labels = _patches(cut.faces, paths, corners)
     left = np.flatnonzero((directed_edges(cut.faces) == paths[0][:2]).all(axis=1))[0] // 3
     if labels[left] != 0:  # u0 lies to the left of the path from (0,0,0) to (0,0,1), seen from outside
@@ -67,14 +69,19 @@ def cut_surface(layout: CubeLayout, corners: IntArray) -> CubeSurface:
     return CubeSurface(cut, paths, labels)
 
 
-def _trace_paths(position: Array, faces: IntArray, corners: IntArray) -> list[IntArray]:
+def _trace_paths(cut: CubeLayout, corners: IntArray, ridges: Ridges | None) -> list[IntArray]:
     """Return disjoint paths along mesh edges, one for each cube edge.
 
     Where a path is blocked, all paths are traced again, and this path comes first.
     """
+    edges = edge_table(cut.faces)[0]
+    factors = np.ones(len(edges))
     order = list(range(len(EDGES)))
+    if ridges is not None:
+        factors[ridges.along(cut.points, edges)] = _FOLLOWED
+        order.sort(key=lambda number: _share_aside(cut, edges, factors, corners, number))
     for _ in range(_ORDERS):
-        paths, blocked = _trace_in_order(position, faces, corners, order)
+        paths, blocked = _trace_in_order(cut.places, edges, factors, corners, order)
         if blocked is None:
             return [paths[k] for k in range(len(EDGES))]
         order.remove(blocked)
@@ -83,11 +90,28 @@ def _trace_paths(position: Array, faces: IntArray, corners: IntArray) -> list[In
     raise PathError(f"no path left on the surface between cube corners {CORNERS[i]} and {CORNERS[j]}")
 
 
+def _share_aside(cut: CubeLayout, edges: IntArray, factors: Array, corners: IntArray, number: int) -> float:
+    """Return the share of one path, traced alone, that lies off all ridges.
+
+    Paths that follow ridges are traced first: others would take the first piece of such a ridge on their way.
+    """
+    paths, _ = _trace_in_order(cut.places, edges, factors, corners, [number])
+    if not paths:
+        return 1.0
+    steps = np.sort(np.stack([paths[number][:-1], paths[number][1:]], axis=1), axis=1)
+    followed = edges[factors < 1.0]
+    off = ~np.isin(steps @ [len(cut.points), 1], followed @ [len(cut.points), 1])
+    lengths = np.linalg.norm(cut.points[steps[:, 1]] - cut.points[steps[:, 0]], axis=1)
+    return float(lengths[off].sum() / lengths.sum())
+
+
 def _trace_in_order(
-    position: Array, faces: IntArray, corners: IntArray, order: list[int]
+    position: Array, edges: IntArray, factors: Array, corners: IntArray, order: list[int]
 ) -> tuple[dict[int, IntArray], int | None]:
-    """Return the cheapest paths by edge number, and the first blocked edge; vertices off the cube edge cost more."""
-    edges = edge_table(faces)[0]
+    """Return the cheapest paths by edge number, and the first blocked edge; vertices off the cube edge cost more.
+
+    factors: (e,), of the cost of the mesh's edges (e, 2).
+    """
     length = np.linalg.norm(position[edges[:, 0]] - position[edges[:, 1]], axis=1)
     radial = 0.5 + project_radially(position - 0.5)
     free = np.ones(len(position), dtype=bool)
@@ -99,7 +123,7 @@ def _trace_in_order(
         usable[corners[[i, j]]] = True
         keep = usable[edges].all(axis=1)
         stray = _distance_to_segment(radial, CORNERS[i], CORNERS[j])[edges[keep]].max(axis=1)
-        cost = (length[keep] + 1e-9) * (1.0 + _STRAY * stray / _STRAY_DISTANCE)
+        cost = factors[keep] * (length[keep] + 1e-9) * (1.0 + _STRAY * stray / _STRAY_DISTANCE)
         a, b = edges[keep].T
         graph = coo_array((cost, (a, b)), shape=(len(position),) * 2).tocsr()
         _, previous = dijkstra(graph, directed=False, indices=corners[i], return_predecessors=True)
@@ -150,13 +174,13 @@ def edge_targets(mapped: Array, paths: list[IntArray]) -> tuple[IntArray, Array,
     return np.concatenate(paths), np.concatenate(targets), np.stack([starts, starts + 1], axis=1)
 
 
-def lay_out(layout: CubeLayout, corners: IntArray) -> CubeLayout:
+def lay_out(layout: CubeLayout, corners: IntArray, ridges: Ridges | None = None) -> CubeLayout:
     """Return a layout without a flipped triangle: the surface is cut along paths, and its patches spread on the cube.
 
-    layout: a layout with places close to the cube's boundary, which may be tangled. corners: (8,), vertices. Raises
-    PathError as `cut_surface` does.
+    layout: a layout with places close to the cube's boundary, which may be tangled. corners: (8,), vertices. ridges: as
+    in `cut_surface`, which raises PathError.
     """
-    surface = cut_surface(layout, corners)
+    surface = cut_surface(layout, corners, ridges)
     points, places = surface.layout.points, surface.layout.places
     path, target, _ = edge_targets(places, surface.paths)
     places[path] = target

@@ -50,12 +50,12 @@ def new_flips(before: Array, after: Array, faces: IntArray) -> Mask:
     return np.ones(len(before), dtype=bool)
 
 
-def unflip(parameters: Array, faces: IntArray) -> Array:
+def unflip(parameters: Array, faces: IntArray, still: Mask | None = None) -> Array:
     """Turn flipped triangles outwards by the least moves of their corners, sweep by sweep; some may stay flipped.
 
     This suits a few flips in a layout whose points should stay: `untangle` flattens whole neighbourhoods. Seen from the
     centre, the volume under a triangle is linear in each corner, so each triangle gives one Newton step, and every
-    corner takes the mean of the steps of its triangles.
+    corner takes the mean of the steps of its triangles. still: (n,), the points that must not move.
     """
     direction = _directions(parameters)
     volumes = np.abs(np.linalg.det(direction[faces]))
@@ -73,17 +73,20 @@ def unflip(parameters: Array, faces: IntArray) -> Array:
         count = np.bincount(used.ravel(), minlength=len(direction))[:, None]
         pushed = size[:, None, None] * slopes
         total = [np.bincount(used.ravel(), pushed[:, :, c].ravel(), len(direction)) for c in range(3)]
-        direction = direction + np.stack(total, axis=1) / np.maximum(count, 1)
+        step = np.stack(total, axis=1) / np.maximum(count, 1)
+        if still is not None:
+            step[still] = 0.0
+        direction = direction + step
         direction /= np.linalg.norm(direction, axis=1, keepdims=True)
     return snap(0.5 + direction)
 
 
-def untangle(parameters: Array, faces: IntArray, sweeps: int = _SWEEPS) -> Array:
+def untangle(parameters: Array, faces: IntArray, sweeps: int = _SWEEPS, still: Mask | None = None) -> Array:
     """Return the parameters (n, 3) after relaxation of the vertices around flipped triangles, until none is left.
 
     A relaxed vertex moves half way to the mean of its neighbours, seen from the centre. Only vertices of triangles that
     are flipped at the time move; where triangles stay flipped, one more ring of neighbours joins after every _PATIENCE
-    sweeps. After all `sweeps` some flips may be left.
+    sweeps. After all `sweeps` some flips may be left. still: (n,), points that must not move.
     """
     i, j = faces.ravel(), faces[:, [1, 2, 0]].ravel()  # closed surface: both directions appear
     direction = _directions(parameters)
@@ -95,6 +98,8 @@ def untangle(parameters: Array, faces: IntArray, sweeps: int = _SWEEPS) -> Array
         free[faces[bad].ravel()] = True
         for _ in range(sweep // _PATIENCE):
             free[i[free[j]]] = True
+        if still is not None:
+            free &= ~still
         used = free[i]
         total = np.stack([np.bincount(i[used], direction[j[used], c], len(free)) for c in range(3)], axis=1)[free]
         moved = direction[free] + total / np.linalg.norm(total, axis=1, keepdims=True)
@@ -102,12 +107,12 @@ def untangle(parameters: Array, faces: IntArray, sweeps: int = _SWEEPS) -> Array
     return snap(0.5 + direction)
 
 
-def untangle_whole(parameters: Array, faces: IntArray, sweeps: int = _SWEEPS) -> Array:
+def untangle_whole(parameters: Array, faces: IntArray, sweeps: int = _SWEEPS, still: Mask | None = None) -> Array:
     """Return the untangled parameters (n, 3), or the given parameters where flips would be left.
 
     Neighbours join ring after ring, so a flip that cannot be removed would disturb a whole limb of the surface.
     """
-    untangled = untangle(parameters, faces, sweeps)
+    untangled = untangle(parameters, faces, sweeps, still)
     return parameters if flipped(untangled, faces).any() else untangled
 
 

@@ -36,6 +36,8 @@ class SlidingParameters:
     cube_faces: the faces, 6 * block + face; by default the nearest ones of one cube. triangles: (m, 3), between the
     points; on one cube, `relax` and `slide` keep the layout of these one-to-one. On a body of several
     blocks parameters are assigned anew before each round (reassignment.py), and there is no layout to keep.
+    fixed: (N, 3), the parameters of each point that stay as they are: those of a point of a sharp edge that is carried
+    by an edge of the cube, along which it slides.
     """
 
     def __init__(
@@ -44,8 +46,10 @@ class SlidingParameters:
         parameters: Array,
         cube_faces: IntArray | None = None,
         triangles: IntArray = _NO_TRIANGLES,
+        fixed: Mask | None = None,
     ) -> None:
         self.nets, self.triangles = nets, triangles
+        self.fixed = np.zeros(parameters.shape, dtype=bool) if fixed is None else fixed
         self.measure_in(np.ones((len(nets.knots), 3)))
         self.place(parameters, nearest_faces(parameters) if cube_faces is None else cube_faces)
 
@@ -73,7 +77,7 @@ class SlidingParameters:
 
     def on_nets(self, nets: Nets) -> "SlidingParameters":
         """Return the same parameters for blocks with other knots."""
-        return SlidingParameters(nets, self.parameters, self.cube_faces, self.triangles)
+        return SlidingParameters(nets, self.parameters, self.cube_faces, self.triangles, self.fixed.copy())
 
     @property
     def blocks(self) -> IntArray:
@@ -83,6 +87,11 @@ class SlidingParameters:
     def values(self, control: Array) -> Array:
         """Return F at the parameters, (N, 3)."""
         return self.window.derivatives(control)[0]
+
+    @property
+    def still(self) -> Mask:
+        """Return the mask (N,) of the points that are not moved to untangle triangles."""
+        return np.asarray(self.fixed.any(axis=1))
 
     def spans(self) -> IntArray:
         """Return the span of each parameter, with its block, (N, 4)."""
@@ -114,7 +123,7 @@ class SlidingParameters:
 
         def part(rows: slice) -> tuple[Array, ...]:
             known = (window.indices[rows], window.in_a[rows], window.in_b[rows])
-            at = (self.parameters[rows], self.cube_faces[rows])
+            at = (self.parameters[rows], self.cube_faces[rows], self.fixed[rows])
             return _slid(polynomials, edges, *at, *known, field, points[rows], longest, reach)
 
         found = in_parallel(part, pieces(len(points)))
@@ -132,7 +141,8 @@ class SlidingParameters:
             if not blocked.any():
                 break
             share[blocked] *= 0.5
-            folded = fold_over_edges(self.nets, parameters + share[:, None] * (goal - parameters), cube_faces)
+            moved = parameters + share[:, None] * (goal - parameters)
+            folded = fold_over_edges(self.nets, moved, cube_faces, self.fixed)
             self.place(*folded)
         self._keep(parameters, cube_faces, new_flips(parameters, self.parameters, self.triangles))
 
@@ -148,7 +158,7 @@ class SlidingParameters:
         if not self.nets.one_cube:
             return other
         other.unflip()
-        other._move(untangle_whole(other.parameters, self.triangles, sweeps))
+        other._move(untangle_whole(other.parameters, self.triangles, sweeps, other.still))
         for _ in range(slides):
             other.slide(control, points, keep_layout=True)
         return other
@@ -157,11 +167,11 @@ class SlidingParameters:
         """Untangle flipped triangles in a few sweeps, so that flips of several slides do not accumulate."""
         if not self.nets.one_cube:
             return
-        self._move(untangle(self.parameters, self.triangles, sweeps))
+        self._move(untangle(self.parameters, self.triangles, sweeps, self.still))
 
     def unflip(self) -> None:
         """Turn flipped triangles outwards by small moves of their own points; all other points stay."""
-        self._move(unflip(self.parameters, self.triangles))
+        self._move(unflip(self.parameters, self.triangles, self.still))
 
     def _move(self, places: Array) -> None:
         moved = np.abs(places - self.parameters).max(axis=1) > 1e-9
@@ -198,6 +208,7 @@ def _slid(
     edges: Edges,
     parameters: Array,
     cube_faces: IntArray,
+    fixed: Mask,
     indices: IntArray,
     in_a: Array,
     in_b: Array,
@@ -225,6 +236,9 @@ def _slid(
             ra, rb = ra + along_a * off, rb + along_b * off
         step_a, step_b = damped_solution(aa, bb, ab, ra, rb, _DAMPING)
         face = cube_faces[n]
+        free_a, free_b = not fixed[n, (face % 6 // 2 + 1) % 3], not fixed[n, (face % 6 // 2 + 2) % 3]
+        if not (free_a and free_b):
+            step_a, step_b = free_a * ra / (aa + 1e-150), free_b * rb / (bb + 1e-150)
         share = min(1.0, max_steps[face // 6] / max(np.sqrt(step_a**2 + step_b**2), 1e-300))
         goal[n, (face % 6 // 2 + 1) % 3] -= share * step_a
         goal[n, (face % 6 // 2 + 2) % 3] -= share * step_b
@@ -232,7 +246,7 @@ def _slid(
             continue
         for c in range(3):
             parameters[n, c] = goal[n, c]
-        _fold(edges, parameters, cube_faces, n)
+        _fold(edges, parameters, cube_faces, fixed, n)
         fill_window(polynomials, parameters, cube_faces, n, indices, in_a, in_b)
         fill_tangents(indices, in_a, in_b, control, n, found)
         after = 0.0
@@ -244,25 +258,31 @@ def _slid(
     return goal, parameters, cube_faces, indices, in_a, in_b
 
 
-def fold_over_edges(nets: Nets, parameters: Array, cube_faces: IntArray) -> tuple[Array, IntArray]:
+def fold_over_edges(
+    nets: Nets, parameters: Array, cube_faces: IntArray, fixed: Mask | None = None
+) -> tuple[Array, IntArray]:
     """Return parameters and faces after steps that left a face continue on the neighbouring face; all blocks are cubes.
 
-    The part of a step beyond the edge points inwards on the neighbouring face.
+    The part of a step beyond the edge points inwards on the neighbouring face. fixed: as in SlidingParameters.
     """
     parameters, cube_faces = parameters.copy(), cube_faces.copy()
-    _fold_all((next_faces(nets), np.ones((len(nets.knots), 3))), parameters, cube_faces)
+    held = np.zeros(parameters.shape, dtype=bool) if fixed is None else fixed
+    _fold_all((next_faces(nets), np.ones((len(nets.knots), 3))), parameters, cube_faces, held)
     return parameters, cube_faces
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def _fold_all(edges: Edges, parameters: Array, cube_faces: IntArray) -> None:
+def _fold_all(edges: Edges, parameters: Array, cube_faces: IntArray, fixed: Mask) -> None:
     for n in range(len(parameters)):
-        _fold(edges, parameters, cube_faces, n)
+        _fold(edges, parameters, cube_faces, fixed, n)
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def _fold(edges: Edges, parameters: Array, cube_faces: IntArray, n: int) -> None:
-    """Continue the step of point n on the neighbouring face, in place."""
+def _fold(edges: Edges, parameters: Array, cube_faces: IntArray, fixed: Mask, n: int) -> None:
+    """Continue the step of point n on the neighbouring face, in place.
+
+    The step ends at the ends of an edge that carries the point.
+    """
     table, boxes = edges
     face = cube_faces[n]
     block, constant = face // 6, face % 6 // 2
@@ -271,7 +291,7 @@ def _fold(edges: Edges, parameters: Array, cube_faces: IntArray, n: int) -> None
         outside = boxes[block, d] * max(-parameters[n, d], parameters[n, d] - 1.0)
         if d != constant and outside > overshoot:
             axis, overshoot = d, outside
-    if overshoot > 0.0:
+    if overshoot > 0.0 and not fixed[n, constant]:
         other, inwards, side, reverse = table[face, axis, int(parameters[n, axis] > 0.5)]
         along = parameters[n, 3 - constant - axis]
         step = overshoot / boxes[other // 6, inwards]

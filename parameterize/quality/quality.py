@@ -16,6 +16,7 @@ from ..cube.boundary_map import BoundaryMap, on_faces
 from ..display import Shown
 from ..spline.multipatch import MultiPatch
 from ..spline.volume import FACE_NAMES, BSplineVolume
+from ..surface.features import SHARP
 from .distances import Distances
 from .distortion import BoxDistortion, Distortion, arap_grid, in_own_box
 from .proved import proved, proved_of
@@ -193,6 +194,7 @@ def measure(
     boundary: BoundaryMap,
     certificate: Certificate | BodyCertificate,
     boundary_check: BoundaryCheck,
+    sharp: float = SHARP,
 ) -> QualityReport:
     """Measure a volume or several patches against their mesh; return the measures together with the certificate.
 
@@ -200,6 +202,7 @@ def measure(
     with the surface's vertices, in their order.
     scale: the factor that brings the model to volume 1 (Surface.scale).
     certificate, boundary_check: from `certify` and `check_boundary`, of the same body.
+    sharp: the angle in degrees above which an edge of the mesh is sharp.
     Raises ValueError for a scale that is not positive, and for a boundary map of fewer vertices or with vertices on no
     outer face of the body; TypeError for the certificate of another kind of body.
     """
@@ -221,7 +224,7 @@ def measure(
         "diagonal": float(np.linalg.norm(np.ptp(vertices, axis=0))),
         "mesh_samples": len(found.mesh_to_spline.distances),
         "spline_samples": len(found.spline_to_mesh.distances),
-        "sharpness": sharpness_of(body, vertices, faces),
+        "sharpness": sharpness_of(body, vertices, faces, sharp),
     }
     if isinstance(body, MultiPatch) and isinstance(certificate, BodyCertificate):
         return _of_patches(body, certificate, boundary_check, measured)

@@ -15,7 +15,7 @@ from ..spline.bspline import divided_spans
 from ..spline.multipatch import MultiPatch, as_multipatch
 from ..spline.sampled_boundary import SampledBoundary
 from ..spline.volume import FACE_NAMES, BSplineVolume
-from ..surface.features import Features, features_of
+from ..surface.features import SHARP, Features, features_of
 from ..surface.geometry import normals_and_areas
 from ..surface.nearest import closest_triangles
 from .distances import Distances
@@ -54,9 +54,12 @@ class Sharpness:
         return asdict(self)
 
 
-def sharpness_of(body: BSplineVolume | MultiPatch, vertices: Array, faces: IntArray) -> Sharpness:
-    """Measure a body against a closed surface, vertices (n, 3) and faces (m, 3), in one unit of length."""
-    found = features_of(vertices, faces)
+def sharpness_of(body: BSplineVolume | MultiPatch, vertices: Array, faces: IntArray, angle: float = SHARP) -> Sharpness:
+    """Measure a body against a closed surface, vertices (n, 3) and faces (m, 3), in one unit of length.
+
+    angle: in degrees, above which an edge of the surface is sharp.
+    """
+    found = features_of(vertices, faces, angle)
     diagonal = float(np.linalg.norm(np.ptp(vertices, axis=0)))
     distance = None
     if len(found):

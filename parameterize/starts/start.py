@@ -13,6 +13,7 @@ from ..checkpoint import Checkpoints
 from ..coarse import coarse_knots, optimize_coarse_first
 from ..columns.layout import Columns, columns_of
 from ..config import Config, SplineConfig
+from ..cube.carried import Carried
 from ..cube.cutting import subdivide_finely
 from ..cube.layout import CubeLayout
 from ..cube.sphere import lay_on_sphere
@@ -30,7 +31,9 @@ from ..skeleton.graph import Skeleton, SkeletonError
 from ..skeleton.solid import skeleton_of
 from ..spline.nets import Nets
 from ..spline.spline_map import SplineMap
+from ..surface.features import features_of
 from ..surface.geometry import normals_and_areas, vertex_quadrics, vertex_weights
+from ..surface.ridges import Ridges
 from ..surface.surface import Surface
 from ..threads import one_blas_thread
 from ..training.samples import interior_points
@@ -41,6 +44,8 @@ FEWEST_SPANS = 4  # across a block: with fewer its section cannot become round
 COMPACT = 4.0  # cubed area of the surface over 36 pi, at volume 1: bodies with less have no long limbs, and most have
 # less, so that these need not wait for a skeleton
 _CELL = 0.03  # of the lattice whose points tell the areas of sections, at volume 1
+FEW_EDGES = 4.0  # length at volume 1 of sharp edges: less is an eye or a mouth; the rim of a half ball has 5, a cube 12
+PIECE = 0.25  # length at volume 1: a coarse mesh of a smooth body has sharp edges in shorter pieces
 Origin = Literal["network", "growth", "extension", "blocks", "planes", "columns"]
 MOST_POINTS = (
     30_000  # added where long edges of the mesh are cut, else they are cut less finely: memory grows with them
@@ -177,20 +182,32 @@ class Task:
         return found
 
     @cached_property
+    def ridges(self) -> Ridges | None:
+        """Return the ridges of the surface, at volume 1; None where its sharp edges are few or short."""
+        vertices, faces = self.surface.unit_vertices, self.surface.faces
+        found = features_of(vertices, faces, self.surface.sharp)
+        if found.lengths[found.lengths > PIECE].sum() < FEW_EDGES:
+            return None
+        ridges = Ridges.of(found, vertices, faces)
+        return ridges if len(ridges.segments) else None
+
+    @cached_property
     def sphere(self) -> CubeLayout:
         """Return the layout of the surface, at volume 1, on the sphere."""
         surface = self.surface
         return lay_on_sphere(surface.unit_vertices, surface.faces, self.report["progress"])
 
-    def fit(self, layout: CubeLayout, coarse: float) -> SurfaceFit:
+    def fit(self, layout: CubeLayout, coarse: float, kept: Carried | None = None) -> SurfaceFit:
         """Return the surface's points with their first parameters on the boundary of the cube (section 4.3.2, step 1).
 
-        coarse: the number of spans a direction in the first rounds, as a share of that in the last rounds.
+        coarse: the number of spans a direction in the first rounds, as a share of that in the last rounds. kept:
+        the points that slide along the cube's edges alone.
         """
         spline = self.config.spline
         nets = Nets(spline.degree, (coarse_knots(spline, coarse),))
+        faces, fixed = (None, None) if kept is None else (kept.faces, kept.fixed)
         return SurfaceFit(
-            SlidingParameters(nets, layout.places, triangles=layout.faces),
+            SlidingParameters(nets, layout.places, faces, layout.faces, fixed),
             layout.points,
             vertex_quadrics(layout.points, layout.faces, TANGENTIAL),
             vertex_weights(layout.points, layout.faces, layout.n_own),

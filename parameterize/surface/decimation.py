@@ -44,7 +44,7 @@ def fitted_copy(surface: Surface) -> tuple[Surface, str]:
         copy, moved = _reduced(surface, FITTED)
     except MeshError as error:  # such as a surface that meets itself, whose copy tears
         return surface, f"laid out and fitted with all its {before} faces, which takes long: {error}"
-    return copy, (
+    return replace(copy, sharp=surface.sharp), (
         f"laid out and fitted on a copy of {len(copy.faces)} faces, at most {moved:.3g} away; measured on all {before}"
     )
 

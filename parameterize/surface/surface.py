@@ -21,7 +21,7 @@ from .errors import (
     check_indices,
     without_unused_defects,
 )
-from .features import Features, features_of
+from .features import SHARP, Features, features_of
 from .geometry import deepest_point, signed_volume
 from .groups import Groups, checked, renumbered
 from .holes import Close
@@ -74,6 +74,8 @@ class Surface(Brief, Shown):
         of Gmsh, whole numbers given with faces. A face may be in several.
     unit : str
         Of lengths, where the file has one, such as mm.
+    sharp : float
+        The angle in degrees between the normals of two triangles above which their edge is sharp, 40 by default.
 
     Examples
     --------
@@ -97,6 +99,7 @@ class Surface(Brief, Shown):
     crossings: IntArray
     groups: Groups
     unit: str = ""
+    sharp: float = SHARP
 
     def to_unit(self, points: ArrayLike) -> Array:
         """Return points (..., 3) in the user's units as placed points."""
@@ -118,8 +121,8 @@ class Surface(Brief, Shown):
 
     @cached_property
     def features(self) -> Features:
-        """Return the sharp edges, those whose triangles meet at more than 40 degrees."""
-        return features_of(self.vertices, self.faces)
+        """Return the sharp edges, those whose triangles meet at more than the angle `sharp`."""
+        return features_of(self.vertices, self.faces, self.sharp)
 
     @property
     def bbox(self) -> tuple[Array, Array]:

@@ -1,0 +1,84 @@
+"""Starts from a layout of the surface on the cube whose edges follow sharp edges, extended into the solid.
+
+F is smooth but on the cube's edges. A trained or grown map has these where distortion is least, often across planes,
+and rounds the sharp edges; here points of sharp edges lie on the cube's edges from the start, and stay there.
+"""
+
+import logging
+from dataclasses import dataclass, replace
+
+from ..arrays import IntArray
+from ..checkpoint import Checkpoints
+from ..cube.carried import OFF_RIDGES, Carried, carried, choose_sharp_corners
+from ..cube.cube import snap
+from ..cube.edge_paths import PathError, lay_out
+from ..cube.layout import CubeLayout
+from ..extension import extended
+from ..progress import timed
+from ..surface.ridges import Ridges
+from ..threads import one_blas_thread
+from .extension import CELL, schedule
+from .first_spline import COARSE, first_spline
+from .on_cube import surface_on_cube
+from .start import Attempt, Start, Task, optimized
+
+_log = logging.getLogger(__name__)
+
+_TURNS = 3  # of the cube that are tried, until twelve paths are found: corners on sharp edges hardly depend on it
+_LEAST_SHARE = 0.25  # of the cube's edges that follow ridges: of a half ball four of twelve do, around an eye none
+
+
+@dataclass(frozen=True)
+class Sharp(Start):
+    """Make a map by a harmonic extension of a layout whose cube has its edges on sharp edges of the surface."""
+
+    def make(self, task: Task, checkpoints: Checkpoints) -> Attempt | None:
+        """Lay the surface on the cube along its sharp edges, and fit F to that layout, extended into the solid.
+
+        None is returned where the cube's edges find no paths, or hardly follow sharp edges.
+        """
+        with timed(task.seconds, "fit"), one_blas_thread():
+            found = _along_ridges(task)
+            if found is None:
+                return None
+            layout, kept = found
+            fit = task.fit(layout, COARSE, kept)
+            first = first_spline(*extended(layout, CELL), fit)
+        return optimized(first, fit, schedule(task.config.spline), task, checkpoints)
+
+
+SHARP = Sharp("sharp edges", "extension", "laying the cube's edges along sharp edges")
+
+
+def _along_ridges(task: Task) -> tuple[CubeLayout, Carried] | None:
+    """Return the layout whose cube has its edges on ridges, and the points that stay there; None where it has few."""
+    ridges = task.ridges
+    assert ridges is not None  # else this start is not among those of the body
+    for turn in range(_TURNS):
+        layout = surface_on_cube(task, turn)
+        found = [_laid_out(layout, corners, ridges) for corners in _corners(layout, ridges, task.given_corners)]
+        if laid := [one for one in found if one is not None]:
+            best = max(laid, key=lambda one: one[1].length)
+            share = best[1].share
+            _log.info("turn %d of the cube: its edges follow ridges along %.0f %% of their length", turn, 100.0 * share)
+            return best if share >= _LEAST_SHARE else None
+    return None
+
+
+def _corners(layout: CubeLayout, ridges: Ridges, given: IntArray | None) -> list[IntArray]:
+    """Return choices of corners (8,): those that the user gives; else others, too, where one is off all ridges."""
+    if given is not None:
+        return [given]
+    usual, farther = (choose_sharp_corners(layout, ridges, off) for off in OFF_RIDGES)
+    return [usual] if ridges.hold(layout.points[usual]).all() else [usual, farther]
+
+
+def _laid_out(layout: CubeLayout, corners: IntArray, ridges: Ridges) -> tuple[CubeLayout, Carried] | None:
+    """Return the layout with these corners (8,), and what the cube's edges carry; None where they find no paths."""
+    try:
+        laid = lay_out(layout, corners, ridges)
+    except PathError as error:
+        _log.info("%s", error)
+        return None
+    laid = replace(laid, places=snap(laid.places))
+    return laid, carried(laid, ridges)
