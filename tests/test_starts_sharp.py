@@ -12,11 +12,11 @@ from parameterize.starts.sharp import SHARP
 from parameterize.starts.start import Task
 from parameterize.surface.surface import surface_from_arrays
 
-QUICK = preset("fast").scaled(0.1).with_control_points(7)
+QUICK = preset("fast").scaled(0.1).with_control_points(7).with_blocks(1)
 
 
 def test_the_rims_of_a_drum_are_edges_of_the_cube():
-    vertices, faces = drum(72)  # sides: with fewer planes it would be made of exact blocks
+    vertices, faces = drum(72)  # sides: without the limit of one block it would be made of columns
     result = parameterize(surface_from_arrays(vertices, faces, "drum"), QUICK)
     kept = result.quality.sharpness
     assert [one.start for one in result.attempts] == ["sharp edges"] and result.origin == "extension"

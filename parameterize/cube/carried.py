@@ -76,13 +76,12 @@ class Carried:
     """Say which points of a layout on the cube slide along the cube's edges alone.
 
     fixed: (n, 3), the parameters that points keep. faces: (n,), the face of the cube on which they slide. length: of
-    the cube's edges on ridges. share: of the length of all its edges on the surface.
+    the cube's edges on ridges.
     """
 
     fixed: Mask
     faces: IntArray
     length: float
-    share: float
 
 
 def carried(layout: CubeLayout, ridges: Ridges) -> Carried:
@@ -108,5 +107,4 @@ def carried(layout: CubeLayout, ridges: Ridges) -> Carried:
             fixed[own] = np.arange(3) == axis
             others = np.where(at_side[own] & (np.arange(3) != axis), np.arange(3), -1).max(axis=1)
             faces[own] = face_number(others, places[own, others].astype(np.int64))
-    length = float(lengths[on].sum())
-    return Carried(fixed, faces, length, length / float(lengths.sum()))
+    return Carried(fixed, faces, float(lengths[on].sum()))

@@ -20,13 +20,15 @@ class Ridges:
     """Hold the ridges of a surface at volume 1, and tell what lies on them.
 
     segments: (s, 2, 3), the ends of the mesh's edges on ridges. corners: (c, 3), where chains of sharp edges end.
-    links: (k, 2), the corners that a ridge joins. lengths: (k,), of these ridges.
+    links: (k, 2), the corners that a ridge joins. lengths: (k,), of these ridges. total: the length of all sharp edges,
+    those in hollows too.
     """
 
     segments: Array
     corners: Array
     links: IntArray
     lengths: Array
+    total: float
 
     @classmethod
     def of(cls, found: Features, vertices: Array, faces: IntArray) -> "Ridges":
@@ -37,7 +39,8 @@ class Ridges:
         ends = np.array([found.chains[k][[0, -1]] for k in chosen], dtype=np.int64).reshape(-1, 2)
         between = np.isin(ends, found.corners).all(axis=1)
         links = np.searchsorted(found.corners, ends[between])
-        return cls(segments, vertices[found.corners], links, found.lengths[chosen][between])
+        total = float(found.lengths.sum())
+        return cls(segments, vertices[found.corners], links, found.lengths[chosen][between], total)
 
     def hold(self, points: Array) -> Mask:
         """Return whether points (n, 3) lie on a ridge, (n,)."""
