@@ -11,6 +11,7 @@ from parameterize.attempts import COLUMNS, PLANES, STARTS, starts_of
 from parameterize.config import RefinementConfig, preset
 from parameterize.run import parameterize
 from parameterize.spline.multipatch import MultiPatch
+from parameterize.starts.sharp import SHARP
 from parameterize.starts.start import Task
 from parameterize.surface.surface import surface_from_arrays
 
