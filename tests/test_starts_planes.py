@@ -44,7 +44,7 @@ def test_the_options_and_the_corners_of_a_user_come_first():
     assert starts_of(task_of("L")) == (PLANES,)
     assert starts_of(task_of("frustum", QUICK.with_blocks(1))) == (PLANES,)
     assert starts_of(task_of("L", QUICK.with_blocks(1))) == (SHARP, *STARTS)  # an L is no cube
-    assert starts_of(task_of("frustum", corners=np.arange(8))) == STARTS
+    assert starts_of(task_of("frustum", corners=np.arange(8))) == (SHARP, *STARTS)
 
 
 def test_refinement_finds_nothing_to_do(few_distances):
