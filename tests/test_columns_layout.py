@@ -27,12 +27,18 @@ def plate(width, depth, *holes):
     return found
 
 
+def slot():
+    """A straight line of length 2 as wide as a disc of radius 0.5."""
+    return disc(0.5, -1.0) + disc(0.5, 1.0) + CrossSection.square((2.0, 1.0), True)
+
+
 BODIES = {  # what makes each body, the number of its blocks, and its exact volume
     "cylinder": (lambda: disc(1.0).extrude(2.0), 5, 2.0 * np.pi),
     "tilted cylinder": (lambda: disc(1.0).extrude(2.0).rotate((20.0, 35.0, 50.0)), 5, 2.0 * np.pi),
     "washer": (lambda: (disc(1.0) - disc(0.6)).extrude(0.3), 4, 0.3 * 0.64 * np.pi),
     "shaft with a shoulder": (lambda: disc(1.0).extrude(1.0) + disc(0.5).extrude(3.0), 14, 1.5 * np.pi),
     "plate with a hole": (lambda: plate(4.0, 3.0, disc(0.8, 0.3, 0.2)).extrude(1.0), 8, 12.0 - 0.64 * np.pi),
+    "plate with a slot": (lambda: plate(5.0, 3.0, slot()).extrude(1.0), 10, 13.0 - 0.25 * np.pi),
     "blind hole": (
         lambda: plate(4.0, 3.0).extrude(2.0) - disc(0.8).extrude(1.0).translate((0.0, 0.0, 1.0)),
         21,

@@ -11,6 +11,7 @@ from .lines import cross
 
 WIDEST = np.pi / 2.0 + 0.05  # radians by which a piece turns at most: it becomes an edge of a quadrangle
 SAMPLES = 33  # of a piece, in equal steps of its parameter
+_LONGER = 3.0  # times the next line: such a line is a straight part of an outline, beside an arc of short lines
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,17 +136,22 @@ class Chain:
         return np.asarray(inner / np.linalg.norm(inner, axis=1)[:, None])
 
 
-def chains_of(points: Array, lines: IntArray) -> tuple[list[int], list[Chain]]:
+def chains_of(points: Array, lines: IntArray, *, straight: bool = False) -> tuple[list[int], list[Chain]]:
     """Return the points that are corners, and the chains between them.
 
-    A corner is where other than two lines meet, or two that turn by more than the angle of sharp edges.
+    A corner is where other than two lines meet, or two that turn by more than the angle of sharp edges. straight:
+    whether straight parts of smooth outlines are chains of their own, as the sides of a slot.
     """
     around: dict[int, list[int]] = {}
     for a, b in lines.tolist():
         around.setdefault(a, []).append(b)
         around.setdefault(b, []).append(a)
     bend = float(np.cos(np.radians(SHARP)))
-    corners = [v for v in sorted(around) if not runs_on(points, v, around[v], bend)]
+    corners = [
+        v
+        for v in sorted(around)
+        if not runs_on(points, v, around[v], bend) or (straight and _ends_straight(points, v, around[v]))
+    ]
     number = {vertex: k for k, vertex in enumerate(corners)}
     chains, used = list[Chain](), set[tuple[int, int]]()
     for start in [*corners, *(v for v in sorted(around) if v not in number)]:
@@ -163,3 +169,9 @@ def chains_of(points: Array, lines: IntArray) -> tuple[list[int], list[Chain]]:
             else:
                 chains.append(Chain(points[path[:-1]], ()))
     return corners, chains
+
+
+def _ends_straight(points: Array, vertex: int, ends: list[int]) -> bool:
+    """Return whether one of the two lines at a vertex is much longer than the other one."""
+    one, other = np.linalg.norm(points[ends] - points[vertex], axis=1)
+    return bool(max(one, other) > _LONGER * min(one, other))

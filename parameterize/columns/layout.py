@@ -14,7 +14,7 @@ from ..spline.bspline import greville, open_uniform_knots
 from ..spline.nets import Nets
 from ..spline.spline_map import SplineMap
 from ..surface.geometry import signed_volume
-from .curves import Curve, chains_of
+from .curves import Chain, Curve, chains_of
 from .division import Division, division_of
 from .fit import deviation, fitted, needed_spans
 from .lines import lines_of
@@ -59,30 +59,41 @@ def columns_of(vertices: Array, faces: IntArray, spans: int, degree: int, most: 
         return None
     diagonal, volume = float(np.linalg.norm(np.ptp(vertices, axis=0))), signed_volume(vertices, faces)
     limit = MOST_BLOCKS if most is None else min(most, MOST_BLOCKS)
-    found = list(_divisions(stack, limit))
+    found = list(_divisions(stack, limit, volume))
     for division, regions in sorted(found, key=lambda row: row[0].cost):
-        if _fills(division, regions, stack, volume):
-            columns = _columns(division, regions, stack, spans, degree, diagonal)
-            if _is_proved(columns.spline):
-                return columns
+        columns = _columns(division, regions, stack, spans, degree, diagonal)
+        if _is_proved(columns.spline):
+            return columns
     return None
 
 
-def _divisions(stack: Stack, most: int) -> Iterator[tuple[Division, tuple[Region, ...]]]:
-    """Yield divisions of the profiles into columns, `most` blocks or fewer, until one is good."""
+def _divisions(stack: Stack, most: int, volume: float) -> Iterator[tuple[Division, tuple[Region, ...]]]:
+    """Yield divisions of the profiles into columns, `most` blocks or fewer, that fill the body, until one is good."""
     lines = lines_of(stack)
     if lines is None:
         return
-    corners, chains = chains_of(*lines)
-    for cutting in _CUTTINGS:
-        network = network_of(lines[0][corners], chains, cutting)
-        regions = regions_of(network, stack)
-        division = division_of(network, regions, most) if regions else None
-        if division is not None and regions:
+    for corners, chains in _chains(*lines):
+        for cutting in _CUTTINGS:
+            network = network_of(lines[0][corners], chains, cutting)
+            regions = regions_of(network, stack)
+            division = division_of(network, regions, most) if regions else None
+            if division is None or not regions or not _fills(division, regions, stack, volume):
+                continue
             division = division.smoothed()
             yield division, regions
             if division.quality > _GOOD:
                 return
+
+
+def _chains(points: Array, lines: IntArray) -> Iterator[tuple[list[int], list[Chain]]]:
+    """Yield the corners and chains of outlines, first those with straight parts of smooth ones as chains of their own.
+
+    A slot's sides are straight lines then; other outlines have these by chance, and may be divided better without them.
+    """
+    apart, whole = chains_of(points, lines, straight=True), chains_of(points, lines)
+    yield apart
+    if len(whole[0]) < len(apart[0]):
+        yield whole
 
 
 def _fills(division: Division, regions: tuple[Region, ...], stack: Stack, volume: float) -> bool:
