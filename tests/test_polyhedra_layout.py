@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from plane_bodies import BODIES, arrays, box, hull, prism, ring
+from plane_bodies import BODIES, arrays, box, prism, ring
 from shapes import rounded_cube
 
 from parameterize.polyhedra.layout import exact_layout
@@ -75,10 +75,8 @@ def test_a_block_below_a_pyramid_is_cut_upright():
 
 
 def test_bodies_without_exact_blocks_have_none():
-    octahedron = hull((1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0), (0, 0, 1), (0, 0, -1))  # four faces at a corner
     shaft = prism(ring(80, 1.0), 1.0)  # too round
-    for body in (octahedron, shaft):
-        assert exact_layout(*arrays(body), 6) is None
+    assert exact_layout(*arrays(shaft), 6) is None
     assert exact_layout(*rounded_cube(200), 6) is None
 
 

@@ -3,8 +3,10 @@
 Each plane cuts all cells that it crosses, so that neighbouring cells have whole facets in common.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from itertools import combinations
+from typing import Literal
 
 import numpy as np
 
@@ -18,6 +20,7 @@ _PARALLEL = 1e-6  # difference of two unit normals that are taken for one
 _MARGIN = 0.1  # of the diagonal, between the body and the box
 _BOX = -1  # the number of the planes of the box
 
+Beside = Literal["upright", "belts"]
 Facet = tuple[int, tuple[int, ...]]  # the number of its plane, and its points, counterclockwise seen from outside
 Cell = tuple[Facet, ...]
 
@@ -33,24 +36,30 @@ class Arrangement:
     normals : (planes, 3) array
     offsets : (planes,) array
         x lies in plane i where normals[i] @ x = offsets[i].
+    belts : int
+        The number of the first plane across which cells are never merged.
     """
 
     points: Array
     cells: tuple[Cell, ...]
     normals: Array
     offsets: Array
+    belts: int
 
 
-def arrangement_of(body: Polyhedron, *, upright: bool = False) -> Arrangement | None:
+def arrangement_of(body: Polyhedron, beside: Beside | None = None) -> Arrangement | None:
     """Return the cells of a body between the planes of its faces; None for more than MOST_CELLS.
 
-    upright: cut along planes through re-entrant edges, too, at right angles to the faces there; None is returned where
-    all of these are planes of faces.
+    beside: cut along other planes, too; None is returned where all of these are planes of faces. "upright": through
+    re-entrant edges, at right angles to the faces there. "belts": through corners of four faces or more, as those below
+    the chamfers of a block.
     """
     normals, offsets = _different_planes(body)
-    if upright:
-        count = len(normals)
-        normals, offsets = _with_upright(body, normals, offsets)
+    count = len(normals)
+    if beside is not None:
+        found = _upright(body) if beside == "upright" else _belts(body)
+        for normal, offset in found:
+            normals, offsets = _with(body, normals, offsets, normal, offset)
         if len(normals) == count:
             return None
     points, cells = _box(body)
@@ -62,7 +71,8 @@ def arrangement_of(body: Polyhedron, *, upright: bool = False) -> Arrangement | 
     points = _snapped(points, body.vertices[body.corners], near)
     middles = np.array([points[sorted({i for _, ids in cell for i in ids})].mean(axis=0) for cell in cells])
     inside = Body(body.vertices, body.triangles).contains(middles)
-    return Arrangement(points, tuple(cells[k] for k in np.flatnonzero(inside)), normals, offsets)
+    first = count if beside == "belts" else len(normals)
+    return Arrangement(points, tuple(cells[k] for k in np.flatnonzero(inside)), normals, offsets, first)
 
 
 def _different_planes(body: Polyhedron) -> tuple[Array, Array]:
@@ -77,11 +87,17 @@ def _different_planes(body: Polyhedron) -> tuple[Array, Array]:
     return np.array(normals), np.array(offsets)
 
 
-def _with_upright(body: Polyhedron, normals: Array, offsets: Array) -> tuple[Array, Array]:
-    """Return the planes, normals (k, 3) and offsets (k,), with those through re-entrant edges at right angles to faces.
+def _with(body: Polyhedron, normals: Array, offsets: Array, normal: Array, offset: float) -> tuple[Array, Array]:
+    """Return planes, normals (k, 3) and offsets (k,), with another one, unless it is among them."""
+    sides = np.sign(normals @ normal)
+    same = np.abs(sides[:, None] * normals - normal).max(axis=1) < _PARALLEL
+    if np.any(same & (np.abs(sides * offsets - offset) < NEAR * body.diagonal)):
+        return normals, offsets
+    return np.vstack([normals, normal]), np.append(offsets, offset)
 
-    A plane that is known already is left out.
-    """
+
+def _upright(body: Polyhedron) -> Iterator[tuple[Array, float]]:
+    """Yield the planes through re-entrant edges at right angles to the faces there."""
     for one, other, a, b in body.edges:
         along = body.vertices[b] - body.vertices[a]
         if np.cross(body.planes.normals[one], body.planes.normals[other]) @ along >= 0.0:
@@ -89,12 +105,34 @@ def _with_upright(body: Polyhedron, normals: Array, offsets: Array) -> tuple[Arr
         for face in (one, other):
             normal = np.cross(body.planes.normals[face], along)
             normal /= np.linalg.norm(normal)
-            offset = float(normal @ body.vertices[a])
-            sides = np.sign(normals @ normal)
-            same = np.abs(sides[:, None] * normals - normal).max(axis=1) < _PARALLEL
-            if not np.any(same & (np.abs(sides * offsets - offset) < NEAR * body.diagonal)):
-                normals, offsets = np.vstack([normals, normal]), np.append(offsets, offset)
-    return normals, offsets
+            yield normal, float(normal @ body.vertices[a])
+
+
+def _belts(body: Polyhedron) -> Iterator[tuple[Array, float]]:
+    """Yield planes through all corners of four faces or more, each through two edges there that have no common face.
+
+    Those through most such corners come first, then those parallel to a face.
+    """
+    beside: dict[int, list[tuple[int, set[int]]]] = {}
+    for one, other, a, b in body.edges:
+        beside.setdefault(a, []).append((b, {one, other}))
+        beside.setdefault(b, []).append((a, {one, other}))
+    crowded = np.array([vertex for vertex in body.corners.tolist() if len(beside.get(vertex, ())) >= 4], dtype=np.int64)
+    found = []
+    for corner in crowded.tolist():
+        for (b, faces), (c, others) in combinations(beside[corner], 2):
+            normal = np.cross(body.vertices[b] - body.vertices[corner], body.vertices[c] - body.vertices[corner])
+            if not faces & others and (size := np.linalg.norm(normal)) > 0.0:
+                normal /= size
+                offset = float(normal @ body.vertices[corner])
+                near = np.abs(body.vertices[crowded] @ normal - offset) < NEAR * body.diagonal
+                parallel = bool(np.abs(body.planes.normals @ normal).max() > 1.0 - _PARALLEL)
+                found.append((int(near.sum()), parallel, normal, offset, set(crowded[near].tolist())))
+    left = set(crowded.tolist())
+    for *_, normal, offset, own in sorted(found, key=lambda row: row[:2], reverse=True):
+        if own & left:
+            left -= own
+            yield normal, offset
 
 
 def _box(body: Polyhedron) -> tuple[Array, list[Cell]]:

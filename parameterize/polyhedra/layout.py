@@ -73,10 +73,11 @@ def _divisions(body: Polyhedron, most: int) -> Iterator[Hexahedra]:
     Cells that have the faces of cubes are not divided any more.
     """
     yield from (found for found in columns(body) if len(found) <= most)
-    for upright in (False, True):
-        cells = arrangement_of(body, upright=upright)
-        merged = None if cells is None else merged_cells(cells)
-        if cells is None or merged is None or len(merged) > most:
+    for beside in (None, "upright", "belts"):
+        if (cells := arrangement_of(body, beside)) is None:
+            continue
+        merged = merged_cells(cells)
+        if merged is None or len(merged) > most:
             continue
         if (whole := cubes(cells.points, merged)) is not None:
             yield whole

@@ -47,7 +47,8 @@ def merged_cells(found: Arrangement) -> tuple[ConvexCell, ...] | None:
     outer = [key for key in keys if len(owners[key]) == 1]
     facets, between = ([(owners[key][0][1], rings[key]) for key in keys] for keys in (outer, inner))
     sheets = _sheets(between)
-    kept = _kept(found, facets, between, sheets)
+    belts = {int(sheet) for (plane, _), sheet in zip(between, sheets, strict=True) if plane >= found.belts}
+    kept = belts | _kept(found, facets, between, sheets)
     links = [[cell for cell, _ in owners[key]] for k, key in enumerate(inner) if int(sheets[k]) not in kept]
     group = connected(np.array(links, dtype=np.int64).reshape(-1, 2), len(found.cells))
     faces: dict[int, dict[int, list[tuple[tuple[int, ...], int]]]] = defaultdict(lambda: defaultdict(list))

@@ -50,6 +50,8 @@ BODIES = {  # what makes each body, and the number of its blocks
     "box": (lambda: box((0, 0, 0), (1, 2, 3)), 1),
     "sheared box": (lambda: sheared(box((0, 0, 0), (1, 2, 3))), 1),
     "frustum": (lambda: frustum(2.0, 1.0, 1.5), 1),
+    "frustum as wide as the block below": (lambda: box((-1, -1, 0), (1, 1, 1)) + frustum(2.0, 1.0, 0.5, 1.0), 2),
+    "octahedron": (lambda: hull((1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0), (0, 0, 1), (0, 0, -1)), 16),
     "wedge": (lambda: prism([(0, 0), (2, 0), (0, 1)], 1.5), 3),
     "L": (lambda: prism(L, 2.0), 3),
     "sheared L": (lambda: sheared(prism(L, 2.0)), 3),
