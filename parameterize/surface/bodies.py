@@ -86,8 +86,8 @@ def _many(draft: Draft, groups: list[IntArray], sizes: str) -> str:
         (first, second), place = crossed
         return (
             f"{len(groups)} components ({sizes}), components {first} and {second} cross each other at "
-            f"{in_brackets(place)}: unite them in the program that made them, or choose one with --component largest or "
-            "--component N"
+            f"{in_brackets(place)}: unite them in the program that made them, or choose one with --component largest "
+            "or --component N"
         )
     return (
         f"{len(groups)} components ({sizes}): choose one with --component largest or --component N, take each with "
