@@ -20,13 +20,11 @@ from ..threads import one_blas_thread
 from .extension import CELL, schedule
 from .first_spline import COARSE, first_spline
 from .on_cube import surface_on_cube
-from .start import Attempt, Start, Task, optimized
+from .start import ALL, Attempt, Start, Task, optimized
 
 _log = logging.getLogger(__name__)
 
 _TURNS = 3  # of the cube that are tried, until twelve paths are found: corners on sharp edges hardly depend on it
-_ALL = 0.95  # of the length of all sharp edges, which the cube's edges have to carry: with .92 of it on them, a notched
-# cube came out three times as far from its surface as with edges that follow none
 
 
 @dataclass(frozen=True)
@@ -62,7 +60,7 @@ def _along_ridges(task: Task) -> tuple[CubeLayout, Carried] | None:
             best = max(laid, key=lambda one: one[1].length)
             share = best[1].length / ridges.total
             _log.info("turn %d of the cube: its edges carry %.0f %% of the sharp edges", turn, 100.0 * share)
-            return best if share >= _ALL else None
+            return best if share >= ALL else None
     return None
 
 

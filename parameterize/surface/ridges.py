@@ -42,6 +42,11 @@ class Ridges:
         total = float(found.lengths.sum())
         return cls(segments, vertices[found.corners], links, found.lengths[chosen][between], total)
 
+    @property
+    def length(self) -> float:
+        """Return the length of all ridges."""
+        return float(np.linalg.norm(np.diff(self.segments, axis=1), axis=2).sum())
+
     def hold(self, points: Array) -> Mask:
         """Return whether points (n, 3) lie on a ridge, (n,)."""
         ends = np.ascontiguousarray(self.segments.reshape(-1, 3))
