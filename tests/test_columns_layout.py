@@ -84,6 +84,12 @@ def test_a_polygon_of_many_corners_becomes_a_circle():
     assert len(columns) == 5 and columns.off < 4e-4
 
 
+def test_the_angle_of_sharp_edges_decides_what_a_corner_is():
+    vertices, faces = arrays(prism(ring(12, 1.0), 1.0))  # turns of 30 degrees
+    assert columns_of(vertices, faces, 6, 3).off > 1e-3
+    assert columns_of(vertices, faces, 6, 3, sharp=20.0).off < 1e-12
+
+
 def test_the_number_of_blocks_binds():
     vertices, faces = arrays(BODIES["washer"][0]())
     assert columns_of(vertices, faces, 6, 3, most=3) is None

@@ -2,10 +2,9 @@
 
 import numpy as np
 import pytest
-from plane_bodies import BODIES, arrays, box, prism, ring
+from plane_bodies import BODIES, arrays, box, exact_layout, prism, ring
 from shapes import rounded_cube
 
-from parameterize.polyhedra.layout import exact_layout
 from parameterize.spline.volume import FACE_NAMES
 from parameterize.surface.nearest import distance_to_mesh
 
@@ -37,7 +36,7 @@ def edges_of(layout):
 @pytest.mark.parametrize("name", BODIES)
 def test_the_blocks_of_a_body_lie_on_its_faces(name):
     vertices, faces = arrays(name)
-    layout = exact_layout(vertices, faces, 6)
+    layout = exact_layout(vertices, faces)
     assert len(layout) == BODIES[name][1]
     points = outside(layout)
     assert distance_to_mesh(points, vertices, faces).max() < 1e-13 * np.linalg.norm(np.ptp(vertices, axis=0))
@@ -48,27 +47,27 @@ def test_the_blocks_of_a_body_lie_on_its_faces(name):
 
 def test_the_edges_of_one_block_are_the_edges_of_the_body():
     vertices, faces = arrays(box((0, 0, 0), (1, 2, 3)))
-    (block,) = exact_layout(vertices, faces, 6, most=1).blocks
+    (block,) = exact_layout(vertices, faces, most=1).blocks
     sides = np.linalg.norm(block.face("w0")[1, 0] - block.face("w0")[0, 0]), block.spans
     assert sides == (1.0, (3, 7, 10))  # spans are about equally long
-    assert len(edges_of(exact_layout(vertices, faces, 6))) == 12
+    assert len(edges_of(exact_layout(vertices, faces))) == 12
     assert [block.face(name)[0, 0].tolist() for name in FACE_NAMES[::2]] == [[0.0, 0.0, 0.0]] * 3  # u, v, w are x, y, z
 
 
 def test_a_finely_meshed_surface_has_the_same_blocks(monkeypatch):
     vertices, faces = arrays(BODIES["L"][0]().refine(6))
-    assert len(faces) > 500 and len(exact_layout(vertices, faces, 6)) == 3
+    assert len(faces) > 500 and len(exact_layout(vertices, faces)) == 3
 
 
 def test_numbers_in_single_precision_do():
     vertices, faces = arrays(BODIES["L"][0]().rotate((20.0, 35.0, 50.0)).refine(3))
     rounded = vertices.astype(np.float32).astype(np.float64)
-    layout = exact_layout(rounded, faces, 6)
+    layout = exact_layout(rounded, faces)
     assert len(layout) == 3 and distance_to_mesh(outside(layout), vertices, faces).max() < 1e-6
 
 
 def test_a_block_below_a_pyramid_is_cut_upright():
-    layout = exact_layout(*arrays("flat pyramid on a block"), 6)
+    layout = exact_layout(*arrays("flat pyramid on a block"))
     boxes = [np.moveaxis(block.sections, 0, 2).reshape(8, 3) for block in layout.blocks]
     assert sum(len(np.unique(corners.round(9), axis=0)) == 8 and np.ptp(corners[:, 2]) == 1.0 for corners in boxes) == 9
     assert {tuple(np.unique(corners[:, 0].round(9))) for corners in boxes} >= {(-1.0, -0.6), (-0.6, 0.6), (0.6, 1.0)}
@@ -76,11 +75,11 @@ def test_a_block_below_a_pyramid_is_cut_upright():
 
 def test_bodies_without_exact_blocks_have_none():
     shaft = prism(ring(80, 1.0), 1.0)  # too round
-    assert exact_layout(*arrays(shaft), 6) is None
-    assert exact_layout(*rounded_cube(200), 6) is None
+    assert exact_layout(*arrays(shaft)) is None
+    assert exact_layout(*rounded_cube(200)) is None
 
 
 def test_no_more_blocks_than_are_allowed():
     vertices, faces = arrays("U")
-    assert len(exact_layout(vertices, faces, 6, most=3)) == 3  # with two mitres
-    assert exact_layout(vertices, faces, 6, most=2) is None
+    assert len(exact_layout(vertices, faces, most=3)) == 3  # with two mitres
+    assert exact_layout(vertices, faces, most=2) is None

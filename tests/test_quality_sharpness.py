@@ -2,10 +2,9 @@
 
 import numpy as np
 import pytest
-from plane_bodies import arrays
+from plane_bodies import arrays, exact_layout
 from shapes import ball
 
-from parameterize.polyhedra.layout import exact_layout
 from parameterize.quality.sharpness import distance_to_edges, sharpness_of
 from parameterize.spline.multipatch import MultiPatch
 from parameterize.spline.volume import BSplineVolume
@@ -20,7 +19,7 @@ def test_points_have_their_distance_from_the_nearest_edge():
 
 def test_exact_blocks_keep_all_edges():
     vertices, faces = arrays("L")
-    layout = exact_layout(vertices, faces, 6)
+    layout = exact_layout(vertices, faces)
     body = MultiPatch(tuple(block.spline for block in layout.blocks), layout.interfaces)
     found = sharpness_of(body, vertices, faces)
     assert (found.edges, found.corners) == (18, 12) and found.length == pytest.approx(36.0)

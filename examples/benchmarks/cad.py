@@ -10,7 +10,6 @@ they are to be kept.
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -23,7 +22,6 @@ from handle_shapes import write
 from iga_nn.batch.table import Batch
 from iga_nn.batch.table import Row as Known
 from iga_nn.batch.task import Task
-from iga_nn.errors import InputError
 from iga_nn.level_table import csv_text
 from iga_nn.options import MapOptions, WorkerOptions
 from iga_nn.report import document as reports
@@ -86,32 +84,24 @@ def main(argv: list[str] | None = None) -> int:
 
 
 def _options(argv: list[str] | None) -> Options:
-    parser = processes.OneLineParser(
-        prog="cad.py", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = processes.parser_of_surfaces("cad.py", __doc__, Path("out/cad"))
     parser.add_argument("--only", nargs="+", default=list(CAD), metavar="NAME", help="these parts alone")
     parser.add_argument("--control-points", type=int, default=30, help="of one cube, a direction (default: 30)")
-    parser.add_argument("--jobs", type=int, default=1, help="parts at a time (default: 1)")
-    parser.add_argument("--out", type=Path, default=Path("out/cad"), help="folder (default: out/cad)")
     given = parser.parse_args(argv)
-    if given.jobs < 1:
-        parser.error(f"--jobs {given.jobs}: must be at least 1")
+    mapping = MapOptions(
+        device="cpu", control_points=given.control_points, steps_factor=given.steps_factor, resume=True
+    )
+    processes.demand_positive(parser, given, "jobs")
     if unknown := sorted(set(given.only) - set(CAD)):
         parser.error(f"--only {' '.join(unknown)}: no such part; there are {', '.join(CAD)}")
-    mapping = MapOptions(device="cpu", control_points=given.control_points, resume=True)
-    try:
-        mapping.config()
-        (given.out / "parts").mkdir(parents=True, exist_ok=True)
-    except InputError as error:
-        parser.error(str(error))
-    except OSError as error:
-        parser.error(f"{given.out}: cannot be written ({error.strerror}); --out names another folder")
+    processes.demand_runnable(parser, mapping, given.out)
     return Options(tuple(name for name in CAD if name in given.only), mapping, given.jobs, given.out)
 
 
 def _tasks(options: Options) -> list[Task]:
     out = options.out.absolute()
-    return [Task(name, str(out / "parts" / f"{name}.obj"), out / name, options.mapping, None) for name in options.parts]
+    meshes = {name: str(out / "surfaces" / f"{name}.obj") for name in options.parts}
+    return [Task(name, mesh, out / name, options.mapping, None) for name, mesh in meshes.items()]
 
 
 def compute_part(task: Task, number: int, batch: str) -> Ended:

@@ -6,7 +6,7 @@ from functools import cached_property
 import numpy as np
 
 from ..arrays import Array, IntArray
-from ..surface.features import SHARP, runs_on
+from ..surface.features import chains_between, runs_on
 from .lines import cross
 
 WIDEST = np.pi / 2.0 + 0.05  # radians by which a piece turns at most: it becomes an edge of a quadrangle
@@ -136,39 +136,28 @@ class Chain:
         return np.asarray(inner / np.linalg.norm(inner, axis=1)[:, None])
 
 
-def chains_of(points: Array, lines: IntArray, *, straight: bool = False) -> tuple[list[int], list[Chain]]:
+def chains_of(points: Array, lines: IntArray, sharp: float, *, straight: bool = False) -> tuple[list[int], list[Chain]]:
     """Return the points that are corners, and the chains between them.
 
-    A corner is where other than two lines meet, or two that turn by more than the angle of sharp edges. straight:
-    whether straight parts of smooth outlines are chains of their own, as the sides of a slot.
+    A corner is where other than two lines meet, or two that turn by more than `sharp`, in degrees. straight: whether
+    straight parts of smooth outlines are chains of their own, as the sides of a slot.
     """
     around: dict[int, list[int]] = {}
     for a, b in lines.tolist():
         around.setdefault(a, []).append(b)
         around.setdefault(b, []).append(a)
-    bend = float(np.cos(np.radians(SHARP)))
+    bend = float(np.cos(np.radians(sharp)))
     corners = [
         v
         for v in sorted(around)
         if not runs_on(points, v, around[v], bend) or (straight and _ends_straight(points, v, around[v]))
     ]
     number = {vertex: k for k, vertex in enumerate(corners)}
-    chains, used = list[Chain](), set[tuple[int, int]]()
-    for start in [*corners, *(v for v in sorted(around) if v not in number)]:
-        for second in around[start]:
-            if (start, second) in used:
-                continue
-            path = [start, second]
-            while path[-1] not in number and path[-1] != start:
-                a, b = around[path[-1]]
-                path.append(b if a == path[-2] else a)
-            used.update(zip(path, path[1:], strict=False))
-            used.update(zip(path[1:], path, strict=False))
-            if start in number:
-                chains.append(Chain(points[path], (number[start], number[path[-1]])))
-            else:
-                chains.append(Chain(points[path[:-1]], ()))
-    return corners, chains
+    paths = chains_between(around, set(corners))
+    return corners, [
+        Chain(points[path], (number[path[0]], number[path[-1]])) if path[0] in number else Chain(points[path[:-1]], ())
+        for path in paths
+    ]
 
 
 def _ends_straight(points: Array, vertex: int, ends: list[int]) -> bool:

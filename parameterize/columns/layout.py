@@ -13,6 +13,7 @@ from ..polyhedra.layout import FEWEST_SPANS, MOST_BLOCKS, balanced_spans
 from ..spline.bspline import greville, open_uniform_knots
 from ..spline.nets import Nets
 from ..spline.spline_map import SplineMap
+from ..surface.features import SHARP
 from ..surface.geometry import signed_volume
 from .curves import Chain, Curve, chains_of
 from .division import Division, division_of
@@ -49,17 +50,20 @@ class Columns:
         return len(self.layout)
 
 
-def columns_of(vertices: Array, faces: IntArray, spans: int, degree: int, most: int | None = None) -> Columns | None:
+def columns_of(
+    vertices: Array, faces: IntArray, spans: int, degree: int, most: int | None = None, sharp: float = SHARP
+) -> Columns | None:
     """Return blocks that fill a stack of extrusions, and are proved to be one-to-one; None where there are none.
 
     vertices: (n, 3), faces: (m, 3), of a closed surface. spans: across a block that is a cube. most: blocks, at most.
+    sharp: the angle in degrees above which outlines have a corner.
     """
     stack = stack_of(vertices, faces)
     if stack is None:
         return None
     diagonal, volume = float(np.linalg.norm(np.ptp(vertices, axis=0))), signed_volume(vertices, faces)
     limit = MOST_BLOCKS if most is None else min(most, MOST_BLOCKS)
-    found = list(_divisions(stack, limit, volume))
+    found = list(_divisions(stack, limit, volume, sharp))
     for division, regions in sorted(found, key=lambda row: row[0].cost):
         columns = _columns(division, regions, stack, spans, degree, diagonal)
         if _is_proved(columns.spline):
@@ -67,12 +71,12 @@ def columns_of(vertices: Array, faces: IntArray, spans: int, degree: int, most: 
     return None
 
 
-def _divisions(stack: Stack, most: int, volume: float) -> Iterator[tuple[Division, tuple[Region, ...]]]:
+def _divisions(stack: Stack, most: int, volume: float, sharp: float) -> Iterator[tuple[Division, tuple[Region, ...]]]:
     """Yield divisions of the profiles into columns, `most` blocks or fewer, that fill the body, until one is good."""
     lines = lines_of(stack)
     if lines is None:
         return
-    for corners, chains in _chains(*lines):
+    for corners, chains in _chains(*lines, sharp):
         for cutting in _CUTTINGS:
             network = network_of(lines[0][corners], chains, cutting)
             regions = regions_of(network, stack)
@@ -85,12 +89,12 @@ def _divisions(stack: Stack, most: int, volume: float) -> Iterator[tuple[Divisio
                 return
 
 
-def _chains(points: Array, lines: IntArray) -> Iterator[tuple[list[int], list[Chain]]]:
+def _chains(points: Array, lines: IntArray, sharp: float) -> Iterator[tuple[list[int], list[Chain]]]:
     """Yield the corners and chains of outlines, first those with straight parts of smooth ones as chains of their own.
 
     A slot's sides are straight lines then; other outlines have these by chance, and may be divided better without them.
     """
-    apart, whole = chains_of(points, lines, straight=True), chains_of(points, lines)
+    apart, whole = chains_of(points, lines, sharp, straight=True), chains_of(points, lines, sharp)
     yield apart
     if len(whole[0]) < len(apart[0]):
         yield whole

@@ -31,17 +31,8 @@ _known: WeakKeyDictionary[Surface, dict[int | None, Hexahedra | None]] = WeakKey
 _LONGEST = 4  # times the spans of a block that is a cube: those along one direction, at most
 
 
-def exact_layout(vertices: Array, faces: IntArray, spans: int, most: int | None = None) -> BlockLayout | None:
-    """Return trilinear blocks that fill a body whose surface is planes, and are proved to be one-to-one; None if none.
-
-    vertices: (n, 3), faces: (m, 3), of a closed surface. spans: across a block that is a cube. most: blocks, at most.
-    """
-    found = _division(vertices, faces, most)
-    return None if found is None else layout_of(found, spans)
-
-
 def division_of(surface: Surface, most: int | None = None) -> Hexahedra | None:
-    """Return the hexahedra that fill the body of a surface at volume 1, as `exact_layout` does; None if none.
+    """Return the hexahedra that fill the body of a surface at volume 1, as `hexahedra_of` does; None if none.
 
     They are found once for a surface: the estimate of a run asks for them, too.
     """
@@ -49,12 +40,15 @@ def division_of(surface: Surface, most: int | None = None) -> Hexahedra | None:
     if most not in known:
         with one_blas_thread():
             points = surface.to_unit(surface.vertices)
-            known[most] = None if len(surface.crossings) else _division(points, surface.faces, most)
+            known[most] = None if len(surface.crossings) else hexahedra_of(points, surface.faces, most)
     return known[most]
 
 
-def _division(vertices: Array, faces: IntArray, most: int | None) -> Hexahedra | None:
-    """Return the hexahedra of `exact_layout`; the proof is that of trilinear blocks, whatever spans they get."""
+def hexahedra_of(vertices: Array, faces: IntArray, most: int | None = None) -> Hexahedra | None:
+    """Return trilinear hexahedra that fill a body whose surface is planes, and are proved one-to-one; None if none.
+
+    vertices: (n, 3), faces: (m, 3), of a closed surface. most: hexahedra, at most. The proof holds for any spans.
+    """
     body = polyhedron_of(vertices, faces)
     if body is None:
         return None

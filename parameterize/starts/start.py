@@ -171,7 +171,8 @@ class Task:
             return None
         with timed(self.seconds, "fit"), one_blas_thread():
             points = surface.to_unit(surface.vertices)
-            return columns_of(points, surface.faces, spans_across(spline.control_points), spline.degree, most)
+            across = spans_across(spline.control_points)
+            return columns_of(points, surface.faces, across, spline.degree, most, surface.sharp)
 
     @cached_property
     def layout(self) -> BlockLayout:

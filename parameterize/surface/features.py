@@ -55,7 +55,7 @@ def features_of(vertices: Array, faces: IntArray, angle: float = SHARP) -> Featu
         around.setdefault(a, []).append(b)
         around.setdefault(b, []).append(a)
     corners = {vertex for vertex, ends in around.items() if not runs_on(vertices, vertex, ends, bend)}
-    chains = [np.array(chain) for chain in _chains(around, corners)]
+    chains = [np.array(chain) for chain in chains_between(around, corners)]
     lengths = np.array([np.linalg.norm(np.diff(vertices[chain], axis=0), axis=1).sum() for chain in chains])
     label = connected(edges[sharp], len(vertices))
     owners = np.array([label[chain[0]] for chain in chains], dtype=np.int64)
@@ -76,8 +76,11 @@ def runs_on(vertices: Array, vertex: int, ends: list[int], bend: float) -> bool:
     return bool(into @ out > bend * np.linalg.norm(into) * np.linalg.norm(out))
 
 
-def _chains(around: dict[int, list[int]], corners: set[int]) -> list[list[int]]:
-    """Return the chains of vertices between corners, then the closed ones without a corner."""
+def chains_between(around: dict[int, list[int]], corners: set[int]) -> list[list[int]]:
+    """Return the chains of vertices between corners, then the closed ones without a corner, which end where they begin.
+
+    around: of each vertex those to which edges lead, two where it is no corner.
+    """
     chains, used = [], set[tuple[int, int]]()
     for start in [*sorted(corners), *sorted(set(around) - corners)]:
         for second in around[start]:

@@ -3,6 +3,8 @@
 import numpy as np
 from manifold3d import CrossSection, Manifold
 
+from parameterize.polyhedra.layout import hexahedra_of, layout_of
+
 
 def box(low, high):
     """A box between two corners."""
@@ -43,6 +45,12 @@ def arrays(body):
         body = BODIES[body][0]()
     mesh = body.to_mesh64()
     return np.asarray(mesh.vert_properties)[:, :3], np.asarray(mesh.tri_verts, dtype=np.int64)
+
+
+def exact_layout(vertices, faces, most=None):
+    """The exact blocks of a body, six spans across a cube; None where it has none."""
+    found = hexahedra_of(vertices, faces, most)
+    return None if found is None else layout_of(found, 6)
 
 
 L = [(0, 0), (3, 0), (3, 1), (1, 1), (1, 3), (0, 3)]
