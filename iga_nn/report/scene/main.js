@@ -166,9 +166,10 @@ function setControls(scene) {
   element("full").hidden = !document.fullscreenEnabled;
 }
 
-// Where the view cannot be drawn, the first picture of the page stands in its place.
+// Where the view cannot be drawn, the picture of the solution stands in its place, or the first one of the page.
 function showStill() {
-  const picture = document.querySelector("figure img"), still = element("still");
+  const picture = document.querySelector('figure img[alt^="The solution"]') ?? document.querySelector("figure img");
+  const still = element("still");
   element("scene").classList.add("absent");
   still.hidden = !picture;
   if (picture) [still.src, still.alt] = [picture.src, picture.alt];
