@@ -57,6 +57,24 @@ def shaft() -> Triangles:
     return triangles(rod((0, 0, 0), (0, 0, 4), 0.6, 64) + rod((0, 0, 1), (0, 0, 2.5), 1.0, 64), 0.4)
 
 
+def keyed_shaft() -> Triangles:
+    """Return a shaft with chamfers at its ends, a groove and a keyway."""
+    outline = [(0, 0), (0.8, 0), (1, 0.2), (1, 3), (0.8, 3.2), (1, 3.4), (1, 4.4), (0.8, 4.6), (0, 4.6)]
+    return triangles(turned(outline, 64) - block((-0.2, 0.2), (0.7, 2), (1, 2)), 0.4)
+
+
+def rounded_shoulder() -> Triangles:
+    """Return a shaft on a disc, with a rounding of six facets between them."""
+    angles = np.linspace(0.0, np.pi / 2.0, 7)
+    rounding = zip(0.8 - 0.3 * np.sin(angles), 0.9 - 0.3 * np.cos(angles), strict=True)
+    return triangles(turned([(0, 0), (1.2, 0), (1.2, 0.6), *rounding, (0.5, 2.5), (0, 2.5)], 48))
+
+
+def turned(outline: list[tuple[float, float]], sides: int) -> Manifold:
+    """Return the body that an outline of radii and heights makes around the axis."""
+    return CrossSection([outline]).revolve(sides)
+
+
 def notched_cylinder() -> Triangles:
     """Return a shaft's end with a flat and a step."""
     return triangles(rod((0, 0, 0), (0, 0, 3), 1.0, 64) - block((0.5, 2), (-2, 2), (1.5, 4)), 0.4)
@@ -93,6 +111,8 @@ CAD = {
         cylinder,
         cone,
         shaft,
+        keyed_shaft,
+        rounded_shoulder,
         notched_cylinder,
         notched_cube,
         half_round_block,

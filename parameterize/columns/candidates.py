@@ -79,18 +79,53 @@ def branches_of(network: Network, region: Region) -> Array:
     return np.array(found).reshape(-1, 2)
 
 
+def opposite(network: Network, region: Region) -> Array:
+    """Return the points (k, 2) of a region's outline that lie opposite the middles of its curved sides."""
+    rim = Rim.of([outline(network, loop) for loop in region.loops])
+    found = []
+    for side in (network.sides[edge] for loop in region.loops for edge in edges_of(loop)):
+        if not side.is_straight:
+            half = side.halves(-1)[1]
+            point, (x, y) = half.points[0], half.tangents[0]
+            found.append(point + rim.across(point, np.array([-y, x])) * np.array([-y, x]))
+    return np.array(found).reshape(-1, 2)
+
+
+@dataclass(frozen=True, eq=False)
+class Rim:
+    """The lines around a region, from `start` (n, 2) `along` (n, 2); what is nearer than `nearest` is a line's end."""
+
+    start: Array
+    along: Array
+    nearest: float
+
+    @classmethod
+    def of(cls, outlines: Sequence[Array]) -> "Rim":
+        """Return the lines of polygons (k, 2)."""
+        start = np.concatenate(outlines)
+        along = np.concatenate([np.roll(row, -1, axis=0) for row in outlines]) - start
+        return cls(start, along, _TOO_NEAR * float(np.linalg.norm(np.ptp(start, axis=0))))
+
+    def across(self, point: Array, way: Array) -> float:
+        """Return how far the rim is from one of its points (2,) along a unit vector (2,); inf where it is not met."""
+        gap, det = self.start - point, cross(way[None], self.along)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            far, place = cross(gap, self.along) / det, cross(gap, way[None]) / det
+        return float(far[(place >= 0.0) & (place <= 1.0) & (far > self.nearest)].min(initial=np.inf))
+
+
 def edges_of(loop: Sequence[int]) -> list[tuple[int, int]]:
     """Return the pairs of nodes that follow each other in a loop."""
     return list(zip(loop, (*loop[1:], loop[0]), strict=True))
 
 
-def cut_places(curve: Curve, branches: Array) -> list[float]:
-    """Return the places of optional points on a curve: its middle, and of a straight one the feet of branches."""
+def cut_places(curve: Curve, near: Array) -> list[float]:
+    """Return the places of optional points on a curve: its middle, and of a straight one the feet of near points."""
     if not curve.is_straight:
         return [float(curve.halves(0)[0].length / curve.length)]
     along = curve.points[1] - curve.points[0]
-    feet = (branches - curve.points[0]) @ along / (along @ along)
-    far = np.linalg.norm(branches - curve.points[0] - feet[:, None] * along, axis=1)
+    feet = (near - curve.points[0]) @ along / (along @ along)
+    far = np.linalg.norm(near - curve.points[0] - feet[:, None] * along, axis=1)
     found = [0.5]
     for place in feet[np.argsort(np.round(far, 6), kind="stable")]:
         others = np.array([0.0, 1.0, *found])
@@ -104,6 +139,8 @@ def cut(curve: Curve, places: Sequence[float], nodes: list[Array]) -> Cuts:
     numbers, whole, at = [curve.ends[0]], curve, [0]
     for place in places:
         whole, index = whole.with_point(place)
+        if index <= at[-1]:  # a point that is already there
+            continue
         at.append(index)
         numbers.append(len(nodes))
         nodes.append(whole.points[index])
@@ -123,10 +160,7 @@ def beside(points: Array, loops: Sequence[Loop], sides: Sides, outlines: Sequenc
 
     sides: the curves between points that follow each other. outlines: the polygons of the loops.
     """
-    start = np.concatenate(outlines)
-    along = np.concatenate([np.roll(row, -1, axis=0) for row in outlines]) - start
-    nearest = _TOO_NEAR * float(np.linalg.norm(np.ptp(start, axis=0)))
-    found = []
+    rim, found = Rim.of(outlines), []
     for loop in loops:
         for k, node in enumerate(loop):
             before, after = sides[loop[k - 1], node], sides[node, loop[(k + 1) % len(loop)]]
@@ -135,12 +169,8 @@ def beside(points: Array, loops: Sequence[Loop], sides: Sides, outlines: Sequenc
                 continue
             way = np.array([-(into + out)[1], (into + out)[0]])
             way /= np.linalg.norm(way)
-            gap, det = start - points[node], cross(way[None], along)
-            with np.errstate(divide="ignore", invalid="ignore"):
-                far, place = cross(gap, along) / det, cross(gap, way[None]) / det
-            hit = far[(place >= 0.0) & (place <= 1.0) & (far > nearest)].min(initial=np.inf)
             chord = min(float(np.linalg.norm(c.points[-1] - c.points[0])) for c in (before, after))
-            found.append(points[node] + min(_THICK * chord, _CLEAR * hit) * way)
+            found.append(points[node] + min(_THICK * chord, _CLEAR * rim.across(points[node], way)) * way)
     return found
 
 

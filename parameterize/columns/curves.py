@@ -7,6 +7,7 @@ import numpy as np
 
 from ..arrays import Array, IntArray
 from ..surface.features import chains_between, runs_on
+from .fields import Field
 from .lines import cross
 
 WIDEST = np.pi / 2.0 + 0.05  # radians by which a piece turns at most: it becomes an edge of a quadrangle
@@ -91,6 +92,10 @@ class Curve:
         tangent = (along / np.linalg.norm(along))[None]
         points = np.concatenate([self.points[:k], self.at(np.array([place])), self.points[k:]])
         return Curve(self.ends, points, np.concatenate([self.tangents[:k], tangent, self.tangents[k:]])), k
+
+    def moved(self, field: Field) -> "Curve":
+        """Return the curve in the plane that a field has moved."""
+        return Curve(self.ends, field(self.points), field.directions(self.points, self.tangents))
 
     def halves(self, node: int) -> tuple["Curve", "Curve"]:
         """Return two parts with a new node between them, near the middle."""

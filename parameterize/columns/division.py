@@ -12,8 +12,9 @@ from scipy.optimize import Bounds, LinearConstraint, milp
 from scipy.sparse import csr_array
 
 from ..arrays import Array
-from .candidates import Candidates, Cuts, beside, branches_of, candidates_of, cut, cut_places, edges_of
+from .candidates import Candidates, Cuts, beside, branches_of, candidates_of, cut, cut_places, edges_of, opposite
 from .coons import Quad, Sides, qualities, smoothed
+from .fields import Field
 from .network import Network
 from .regions import Region, outline
 
@@ -56,19 +57,26 @@ class Division:
         """Return the division with its inner points moved."""
         return replace(self, points=smoothed(self.points, self.quads, self.sides, self.inner))
 
+    def moved(self, field: Field) -> "Division":
+        """Return the division of the plane that a field has moved."""
+        sides = {edge: curve.moved(field) for edge, curve in self.sides.items()}
+        return replace(self, points=field(self.points), sides=sides)
 
-def division_of(network: Network, regions: Sequence[Region], most: int) -> Division | None:
+
+def division_of(network: Network, regions: Sequence[Region], most: int, *, facing: bool = False) -> Division | None:
     """Return the division of regions into quadrangles that costs least; None where there is none.
 
-    most: blocks, at most, one for each slab of each quadrangle.
+    most: blocks, at most, one for each slab of each quadrangle. facing: whether straight sides have optional points
+    opposite curved ones, too.
     """
     branches = [branches_of(network, region) for region in regions]
     nodes = list(network.nodes)
     at: dict[tuple[int, int], Array] = {}
     for region, own in zip(regions, branches, strict=True):
+        near = np.concatenate([own, opposite(network, region)]) if facing else own
         for edge in (edge for loop in region.loops for edge in edges_of(loop)):
             key = (min(edge), max(edge))
-            at[key] = np.concatenate([at.get(key, np.empty((0, 2))), own])
+            at[key] = np.concatenate([at.get(key, np.empty((0, 2))), near])
     cuts: dict[tuple[int, int], Cuts] = {}
     for curve in network.curves:
         if (key := (min(curve.ends), max(curve.ends))) in at:

@@ -1,6 +1,6 @@
 """Makes the blocks of a stack of extrusions: columns over the quadrangles of its profiles, whose curves are splines."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,18 +14,18 @@ from ..spline.bspline import greville, open_uniform_knots
 from ..spline.nets import Nets
 from ..spline.spline_map import SplineMap
 from ..surface.features import SHARP
-from ..surface.geometry import signed_volume
+from .coons import Quad
 from .curves import Chain, Curve, chains_of
 from .division import Division, division_of
 from .fit import deviation, fitted, needed_spans
 from .lines import lines_of
 from .network import Cutting, network_of
 from .regions import Region, regions_of
-from .stack import Stack, area_of, stack_of
+from .stack import SAME, Stack, area_of, stack_of
+from .tapers import tapered_stack_of
 
 _GOOD = 0.3  # quality of a division after which no other cutting is tried
-_CUTTINGS = (Cutting(), Cutting(radial=True), Cutting(finer=2.0))
-_SAME = 1e-5  # relative: the volume of the blocks is that of the body, up to what lies between curves and their lines
+_CUTTINGS = (Cutting(), Cutting(radial=True), Cutting(finer=2.0), Cutting(finer=2.0, facing=True))
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,12 +58,12 @@ def columns_of(
     vertices: (n, 3), faces: (m, 3), of a closed surface. spans: across a block that is a cube. most: blocks, at most.
     sharp: the angle in degrees above which outlines have a corner.
     """
-    stack = stack_of(vertices, faces)
+    stack = stack_of(vertices, faces) or tapered_stack_of(vertices, faces)
     if stack is None:
         return None
-    diagonal, volume = float(np.linalg.norm(np.ptp(vertices, axis=0))), signed_volume(vertices, faces)
+    diagonal = float(np.linalg.norm(np.ptp(vertices, axis=0)))
     limit = MOST_BLOCKS if most is None else min(most, MOST_BLOCKS)
-    found = list(_divisions(stack, limit, volume, sharp))
+    found = list(_divisions(stack, limit, sharp))
     for division, regions in sorted(found, key=lambda row: row[0].cost):
         columns = _columns(division, regions, stack, spans, degree, diagonal)
         if _is_proved(columns.spline):
@@ -71,7 +71,7 @@ def columns_of(
     return None
 
 
-def _divisions(stack: Stack, most: int, volume: float, sharp: float) -> Iterator[tuple[Division, tuple[Region, ...]]]:
+def _divisions(stack: Stack, most: int, sharp: float) -> Iterator[tuple[Division, tuple[Region, ...]]]:
     """Yield divisions of the profiles into columns, `most` blocks or fewer, that fill the body, until one is good."""
     lines = lines_of(stack)
     if lines is None:
@@ -80,8 +80,8 @@ def _divisions(stack: Stack, most: int, volume: float, sharp: float) -> Iterator
         for cutting in _CUTTINGS:
             network = network_of(lines[0][corners], chains, cutting)
             regions = regions_of(network, stack)
-            division = division_of(network, regions, most) if regions else None
-            if division is None or not regions or not _fills(division, regions, stack, volume):
+            division = division_of(network, regions, most, facing=cutting.facing) if regions else None
+            if division is None or not regions or not _fills(division, regions, stack):
                 continue
             division = division.smoothed()
             yield division, regions
@@ -100,8 +100,8 @@ def _chains(points: Array, lines: IntArray, sharp: float) -> Iterator[tuple[list
         yield whole
 
 
-def _fills(division: Division, regions: tuple[Region, ...], stack: Stack, volume: float) -> bool:
-    """Return whether columns over quadrangles have a body's volume, up to what lies between curves and their lines."""
+def _fills(division: Division, regions: tuple[Region, ...], stack: Stack) -> bool:
+    """Return whether columns over quadrangles have a stack's volume, up to what lies between curves and their lines."""
     layers = np.array([np.diff(stack.heights)[list(region.solid)].sum() for region in regions])
     total = between = 0.0
     for (a, b, c, d), owner in zip(division.quads, division.owners, strict=True):
@@ -109,7 +109,7 @@ def _fills(division: Division, regions: tuple[Region, ...], stack: Stack, volume
         rows = [c.samples if c is not None else division.points[[k]] for c, k in zip(curves, (a, b, c, d), strict=True)]
         total += layers[owner] * area_of(np.concatenate(rows))
         between += layers[owner] * sum(_between(curve) for curve in curves if curve is not None)
-    return abs(total - volume) <= between + _SAME * volume
+    return abs(total - stack.volume) <= between + SAME * stack.volume
 
 
 def _between(curve: Curve) -> float:
@@ -126,7 +126,8 @@ def _columns(
         for quad, owner in zip(division.quads, division.owners, strict=True)
         for layer in np.flatnonzero(regions[owner].solid).tolist()
     ]
-    blocks = [_block(k, division, stack, *one, (1, 1, 1)) for k, one in enumerate(plan)]
+    levels = [division.moved(field) for field in stack.fields] or [division] * len(stack.heights)
+    blocks = [_block(k, levels, stack, *one, (1, 1, 1)) for k, one in enumerate(plan)]
     plain = BlockLayout.from_blocks(blocks)
     lengths, fewest = np.empty((len(plan), 3)), np.full((len(plan), 3), FEWEST_SPANS)
     needs = {edge: needed_spans(curve, degree, diagonal) for edge, curve in division.sides.items() if edge[0] < edge[1]}
@@ -142,28 +143,43 @@ def _columns(
     knots = tuple(tuple(open_uniform_knots(degree + n, degree) for n in row) for row in counts.tolist())
     nets = Nets(degree, knots, plain.interfaces)  # type: ignore[arg-type]
     parts, off = [], 0.0
-    for ((a, b, c, d), layer), own in zip(plan, knots, strict=True):
-        edges = ((a, b), (d, c), (a, d), (b, c))
-        rows = [_side(division, edge, own[k // 2], degree) for k, edge in enumerate(edges)]
-        for edge, row, knot in zip(edges, rows, np.repeat(np.arange(2), 2), strict=True):
-            if edge in division.sides:
-                off = max(off, deviation(division.sides[edge], own[knot], degree, row))
-        flat = _coons(rows, *(greville(row, degree) for row in own[:2]))
-        low, high = stack.heights[layer : layer + 2]
-        heights = low + (high - low) * greville(own[2], degree)
-        across = flat @ stack.frame[:2]  # (n_u, n_v, 3)
-        parts.append(np.moveaxis(across[:, :, None] + heights[:, None] * stack.frame[2], -1, 0))
+    for (quad, layer), own in zip(plan, knots, strict=True):
+        ends = [_plane_net(levels[layer], quad, own, degree)]
+        ends += [ends[0] if stack.fields == () else _plane_net(levels[layer + 1], quad, own, degree)]
+        off = max(off, *(away for _, away in ends))
+        low, high = (
+            net @ stack.frame[:2] + stack.heights[k] * stack.frame[2] for k, (net, _) in enumerate(ends, layer)
+        )
+        share = greville(own[2], degree)[:, None]
+        parts.append(np.moveaxis((1.0 - share) * low[:, :, None] + share * high[:, :, None], -1, 0))
     return Columns(layout, SplineMap(nets, nets.merged(nets.joined(parts))), off / diagonal)
 
 
+def _plane_net(division: Division, quad: Quad, knots: Sequence[Array], degree: int) -> tuple[Array, float]:
+    """Return the control points (n_u, n_v, 2) over a quadrangle, and how far its sides are from their curves."""
+    (a, b, c, d), off = quad, 0.0
+    edges = ((a, b), (d, c), (a, d), (b, c))
+    rows = [_side(division, edge, knots[k // 2], degree) for k, edge in enumerate(edges)]
+    for k, (edge, row) in enumerate(zip(edges, rows, strict=True)):
+        if edge in division.sides:
+            off = max(off, deviation(division.sides[edge], knots[k // 2], degree, row))
+    return _coons(rows, *(greville(row, degree) for row in knots[:2])), off
+
+
 def _block(
-    number: int, division: Division, stack: Stack, quad: tuple[int, ...], layer: int, spans: tuple[int, int, int]
+    number: int,
+    levels: Sequence[Division],
+    stack: Stack,
+    quad: tuple[int, ...],
+    layer: int,
+    spans: tuple[int, int, int],
 ) -> Block:
     """Return the column over a quadrangle between two heights, with straight edges."""
-    a, b, c, d = division.points[list(quad)] @ stack.frame[:2]
-    flat = np.array([[a, d], [b, c]])
-    sections = np.stack([flat + height * stack.frame[2] for height in stack.heights[layer : layer + 2]])
-    return Block(f"column {number}", sections, spans)
+    sections = []
+    for k in (layer, layer + 1):
+        a, b, c, d = levels[k].points[list(quad)] @ stack.frame[:2]
+        sections.append(np.array([[a, d], [b, c]]) + stack.heights[k] * stack.frame[2])
+    return Block(f"column {number}", np.stack(sections), spans)
 
 
 def _length(division: Division, edge: tuple[int, int]) -> float:

@@ -15,7 +15,7 @@ def lines_of(stack: Stack) -> tuple[Array, IntArray] | None:
 
     Lines meet at common points alone.
     """
-    loops = [_straightened(loop, stack.near) for loops in stack.profiles for loop in loops]
+    loops = [loop[straightened(loop, stack.near)] for loops in stack.profiles for loop in loops]
     if any(len(loop) < 3 for loop in loops) or sum(map(len, loops)) > MOST_LINES:
         return None
     points = np.concatenate(loops)
@@ -32,24 +32,30 @@ def _cycle(count: int) -> IntArray:
     return np.stack([numbers, np.roll(numbers, -1)], axis=1)
 
 
-def _straightened(loop: Loop, near: float) -> Loop:
-    """Return a polygon (k, 2) without the points that lie on a straight line between others."""
-    turns = np.abs(turns_of(loop))
-    loop = np.roll(loop, -int(turns.argmax()), axis=0)
+def straightened(loop: Loop, near: float) -> IntArray:
+    """Return the numbers of a polygon's corners (k, 2): not of points that lie on a straight line between others."""
+    turn = int(np.abs(turns_of(loop)).argmax())
+    loop = np.roll(loop, -turn, axis=0)
     closed = np.concatenate([loop, loop[:1]])
     kept, first = [0], 0
     for last in range(2, len(closed)):
-        if _off(closed[first + 1 : last], closed[first], closed[last]) > 0.5 * near:
+        if _off(closed[first + 1 : last], closed[first], closed[last]).max() > 0.5 * near:
             first = last - 1
             kept.append(first)
-    return np.asarray(loop[kept])
+    for k, last in enumerate(
+        [*kept[2:], len(loop)][: len(kept) - 1], 1
+    ):  # a point just beside a corner may have been taken for it
+        first = kept[k - 1]
+        off = _off(closed[first + 1 : last], closed[first], closed[last])
+        kept[k] = first + 1 + int(np.round(off / near, 6).argmax())
+    return (np.array(kept) + turn) % len(loop)
 
 
-def _off(points: Array, start: Array, end: Array) -> float:
-    """Return the largest distance of points (k, 2) from a line between two points."""
+def _off(points: Array, start: Array, end: Array) -> Array:
+    """Return the distances (k,) of points (k, 2) from a line between two points."""
     along = end - start
     share = np.clip((points - start) @ along / max(float(along @ along), 1e-300), 0.0, 1.0)
-    return float(np.linalg.norm(points - start - share[:, None] * along, axis=1).max())
+    return np.asarray(np.linalg.norm(points - start - share[:, None] * along, axis=1))
 
 
 def turns_of(loop: Loop) -> Array:

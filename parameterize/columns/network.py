@@ -36,11 +36,14 @@ class Cutting:
 
     finer: at least 1. turned: the direction of the normal, in radians, at the first node of a closed chain.
     radial: whether the direction is counted from that in which the middle of the body is seen from the chain's middle.
+    facing: whether straight sides of regions may be cut opposite the middles of curved ones, too: a segment of a disc
+    has no other places for its corners.
     """
 
     finer: float = 1.0
     turned: float = np.pi / 4.0
     radial: bool = False
+    facing: bool = False
 
 
 def network_of(corners: Array, chains: Sequence[Chain], cutting: Cutting) -> Network:

@@ -12,10 +12,11 @@ import numpy as np
 from ..arrays import Array, IntArray
 from ..surface.geometry import doubled_areas, signed_volume
 from ..surface.planes import FLAT
+from .fields import Field
 
 _MOST_AXES = 6  # that are tried: the normals with the most area
 _ALIKE = 1e-3  # the normals in one cell of this size are one direction
-_SAME = 1e-5  # relative: the volume of the slabs is that of the surface
+SAME = 1e-5  # relative: the volume of the slabs is that of the surface
 MOST_SLABS = 12  # a body of more is round along the axis, too
 
 Loop = Array  # the corners (k, 2) of a polygon
@@ -35,12 +36,21 @@ class Stack:
         Of each slab the polygons that bound it, as the section of the surface has them: outer ones counterclockwise.
     near : float
         Points nearer to each other are one.
+    fields : tuple of k + 1 Field
+        How the plane at each height is moved, so that sides lean; () for upright ones.
     """
 
     frame: Array
     heights: Array
     profiles: tuple[tuple[Loop, ...], ...]
     near: float
+    fields: tuple[Field, ...] = ()
+
+    @property
+    def volume(self) -> float:
+        """Return the volume of the upright slabs."""
+        areas = np.array([sum(area_of(loop) for loop in loops) for loops in self.profiles])
+        return float(areas @ np.diff(self.heights))
 
 
 def stack_of(vertices: Array, faces: IntArray) -> Stack | None:
@@ -48,21 +58,26 @@ def stack_of(vertices: Array, faces: IntArray) -> Stack | None:
 
     Vertices may be off by FLAT of the diagonal, as in planes.
     """
-    near = 4.0 * FLAT * float(np.linalg.norm(np.ptp(vertices, axis=0)))
+    near = nearness(vertices)
     volume = signed_volume(vertices, faces)
-    for axis in _axes(doubled_areas(vertices, faces)):
+    for axis in axes_of(doubled_areas(vertices, faces)):
         heights = _levels(vertices, faces, axis, near)
         if heights is None:
             continue
-        frame = _frame(axis)
+        frame = frame_of(axis)
         profiles = tuple(
-            tuple(_section(vertices @ frame.T, faces, low, high))
+            tuple(_profile(vertices @ frame.T, faces, low, high))
             for low, high in zip(heights, heights[1:], strict=False)
         )
-        areas = np.array([sum(area_of(loop) for loop in loops) for loops in profiles])
-        if abs(areas @ np.diff(heights) - volume) <= _SAME * volume:
-            return Stack(frame, heights, profiles, near)
+        found = Stack(frame, heights, profiles, near)
+        if abs(found.volume - volume) <= SAME * volume:
+            return found
     return None
+
+
+def nearness(vertices: Array) -> float:
+    """Return the distance within which points of a surface (n, 3) are one."""
+    return 4.0 * FLAT * float(np.linalg.norm(np.ptp(vertices, axis=0)))
 
 
 def area_of(loop: Loop) -> float:
@@ -71,7 +86,7 @@ def area_of(loop: Loop) -> float:
     return float(0.5 * np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y))
 
 
-def _axes(areas: Array) -> Iterator[Array]:
+def axes_of(areas: Array) -> Iterator[Array]:
     """Yield the unit normals with the most area, from the doubled areas (m, 3), each direction once."""
     sizes = np.linalg.norm(areas, axis=1)
     rows, sizes = areas[sizes > 0.0], sizes[sizes > 0.0]
@@ -98,7 +113,7 @@ def _levels(vertices: Array, faces: IntArray, axis: Array, near: float) -> Array
     return np.array([row.mean() for row in groups]) if 2 <= len(groups) <= MOST_SLABS + 1 else None
 
 
-def _frame(axis: Array) -> Array:
+def frame_of(axis: Array) -> Array:
     """Return two directions across an axis and the axis as rows (3, 3); coordinate axes stay such."""
     first = np.eye(3)[(int(np.abs(axis).argmax()) + 1) % 3]
     first = first - (first @ axis) * axis
@@ -106,7 +121,7 @@ def _frame(axis: Array) -> Array:
     return np.stack([first, np.cross(axis, first), axis])
 
 
-def _section(points: Array, faces: IntArray, low: float, high: float) -> Iterator[Loop]:
+def _profile(points: Array, faces: IntArray, low: float, high: float) -> Iterator[Loop]:
     """Yield the polygons (k, 2) in which a surface, points (n, 3), is cut between two heights.
 
     The body lies on their left. The cut is where no vertex is near.
@@ -114,8 +129,19 @@ def _section(points: Array, faces: IntArray, low: float, high: float) -> Iterato
     inner = points[(points[:, 2] > low) & (points[:, 2] < high), 2]
     levels = np.unique(np.concatenate([inner, [low, high]]))
     gap = int(np.diff(levels).argmax())
-    above = points[:, 2] > 0.5 * (levels[gap] + levels[gap + 1])
     height = 0.5 * (levels[gap] + levels[gap + 1])
+    for edges in section(points, faces, height):
+        ends = points[edges]  # (k, 2, 3)
+        share = ((height - ends[:, 0, 2]) / (ends[:, 1, 2] - ends[:, 0, 2]))[:, None]
+        yield (1.0 - share) * ends[:, 0, :2] + share * ends[:, 1, :2]
+
+
+def section(points: Array, faces: IntArray, height: float) -> Iterator[IntArray]:
+    """Yield the closed chains of edges (k, 2) that cross a height at which no vertex of a surface lies.
+
+    The body lies on the left of each.
+    """
+    above = points[:, 2] > height
     ahead: dict[tuple[int, int], tuple[int, int]] = {}
     for row in faces[np.ptp(above[faces].astype(int), axis=1) > 0].tolist():
         edges = [(a, b) for a, b in zip(row, row[1:] + row[:1], strict=True) if above[a] != above[b]]
@@ -128,9 +154,7 @@ def _section(points: Array, faces: IntArray, low: float, high: float) -> Iterato
         while edge != first:
             chain.append(edge)
             edge = ahead.pop(edge)
-        ends = points[np.array(chain)]  # (k, 2, 3)
-        share = ((height - ends[:, 0, 2]) / (ends[:, 1, 2] - ends[:, 0, 2]))[:, None]
-        yield (1.0 - share) * ends[:, 0, :2] + share * ends[:, 1, :2]
+        yield np.array(chain)
 
 
 def _key(edge: tuple[int, int]) -> tuple[int, int]:
