@@ -9,6 +9,7 @@ from small_run import small_surface, tiny_config
 
 from parameterize import attempts
 from parameterize.attempts import BLOCKS, EXTENSION, GROWTH, LAST, NETWORK, SHARP, STARTS, STIFF, next_start, starts_of
+from parameterize.attempts import NEAR as BLOCKS_ARE_NEAR
 from parameterize.blocks.layout import LayoutError
 from parameterize.optimization.endings import Course, Reason
 from parameterize.run import parameterize
@@ -100,7 +101,9 @@ def test_where_no_blocks_fit_a_body_without_handles_one_cube_is_tried():
     assert Tried(BLOCKS, None, {}).report().ending == "no blocks fit"
     assert next_start((Tried(BLOCKS, None, {}),), (BLOCKS, *STARTS)) is NETWORK
     assert next_start((tried(BLOCKS),), (BLOCKS, *STARTS)) is None
-    assert next_start((tried(BLOCKS, distance=FAR),), (BLOCKS, *STARTS)) is NETWORK
+    for distance in (1.1 * BLOCKS_ARE_NEAR, FAR):
+        assert next_start((tried(BLOCKS, distance=distance),), (BLOCKS, *STARTS)) is NETWORK
+    assert next_start((tried(BLOCKS, distance=0.9 * BLOCKS_ARE_NEAR),), (BLOCKS, *STARTS)) is None
     assert next_start((tried(BLOCKS, distance=FAR),), (BLOCKS,)) is None
     task.config.blocks = 9
     with pytest.raises(LayoutError, match="too thin"):
