@@ -237,3 +237,17 @@ def test_a_body_of_two_free_parts_has_twelve_rigid_motions():
     apart = iga_nn.MultiPatch.from_patches([box((0, 0, 0), 1, 2), box((2, 0, 0), 1, 2)])
     found = iga_nn.modes(apart, iga_nn.Elasticity(traction=free), n=2)
     assert found.rigid == 12 and found.frequencies[0] > 0.01
+
+
+def test_a_face_that_holds_a_patch_by_rounding_alone_leaves_it_free():
+    """The roller of the upper one of two boxes is off its axis by rounding; only the lower one is held along x."""
+
+    def part(low, high):
+        def place(u, v, w):
+            return 8.0 * u + 1e-13 * 30.0 * v, 30.0 * v - 1e-13 * 8.0 * u, low + (high - low) * w
+
+        return iga_nn.BSplineVolume.from_function(place, 7, 3)
+
+    law = iga_nn.Elasticity(roller="ny < -0.999", fix="nz < -0.999", load={"nx > 0.99": (0, 0, 1)})
+    report = iga_nn.solve(iga_nn.MultiPatch.from_patches([part(0.0, 8.0), part(8.0, 50.0)]), law, refine=0).report
+    assert report.converged and report.iterations < 150

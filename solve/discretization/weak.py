@@ -23,6 +23,10 @@ from parameterize.spline.volume import FACE_NAMES
 from ..field import Points
 from ..forms.form import Form
 
+# Share of a component that is held: a plane face across another axis holds so little by rounding alone, and a patch
+# among others that it seemed to hold would be inverted with an eigenvalue of either sign.
+ROUNDING = 1e-12
+
 
 @dataclass(frozen=True, eq=False)
 class WeakFace:
@@ -123,6 +127,7 @@ class WeakFace:
         behind the face, took the fewest iterations, 80, where gamma took 100 and a hundredth of this mean 105.
         """
         held = self.held[component, component]
+        held = np.where(held > ROUNDING * self.weights, held, 0.0)
         fast, slow = float(held @ self.gamma), float(held @ self.slowest)
         loose = float((self.weights - held) @ self.factor)
         return loose + (fast if self.is_whole else float(np.sqrt(fast * slow)))
