@@ -5,7 +5,9 @@ import time
 import numpy as np
 import pytest
 import trimesh
+from manifold3d import CrossSection
 from mesh_files import CUBE, TRIANGLES
+from plane_bodies import arrays
 from shapes import ball
 
 from iga_nn.samples import sample
@@ -58,6 +60,19 @@ def test_on_an_edge_and_at_a_corner_the_normal_decides(axis, side):
 def test_a_nearer_triangle_wins_over_a_better_normal():
     found = cube().nearest([[0.5, 0.5, 0.9], [0.9, 0.5, 0.95]], [[1.0, 0.0, 0.0]] * 2)
     assert np.all(CUBE[TRIANGLES[found]][:, :, 2] == 1.0)
+
+
+def test_a_round_wall_off_its_flat_triangles_ends_at_the_rim():
+    """A bore of twelve sides; its circle lies deeper in the solid than the top is away."""
+    bore = CrossSection.circle(2.0, 48) - CrossSection.circle(1.0, 12)
+    vertices, faces = arrays(bore.extrude(1.0))
+    part = surface_from_arrays(vertices, faces).part
+    angles = (np.arange(12) + 0.5) * np.pi / 6.0
+    outward = np.stack([np.cos(angles), np.sin(angles), np.zeros(12)], axis=1)
+    points = outward + [0.0, 0.0, 0.99]
+    assert np.all(part.normals[part.nearest(points)][:, 2] > 0.9)  # the top is nearer
+    assert np.all(np.sum(part.normals[part.nearest(points, -outward)] * outward, axis=1) < -0.9)
+    assert np.all(part.normals[part.nearest(points, [[0.0, 0.0, 1.0]] * 12)][:, 2] > 0.9)
 
 
 def test_no_points_have_no_triangles():

@@ -18,6 +18,10 @@ NEAR = 1e-6  # of the box's diagonal: triangles whose distances differ by less a
 THIN = 1e-6  # of the box's diagonal: the normal of a lower triangle is rounding
 AGREES = 1e-6  # a triangle is preferred where its cosine is larger by more than this
 SHARP = 30.0  # degrees
+# A triangle whose cosine with a point's normal is less than ASIDE belongs to another face of the part, if one that
+# agrees better lies within FAR, a share of the box's diagonal: a round wall is off the flat triangles of a coarse mesh.
+ASIDE, FAR = 0.5, 0.05
+_ALIKE = 2.0  # cells of a normal's coordinates in [0, 1]: normals in one cell share a search
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -63,7 +67,8 @@ class PartSurface(Brief):
         """Return the triangle (k,) that is nearest to each of the points (k, 3).
 
         normals: (k, 3), of any length. Of triangles that are equally near, as on both sides of an edge, the one whose
-        outward normal agrees best with the given one is taken.
+        outward normal agrees best with the given one is taken; a triangle that is turned away by more than 60 degrees
+        only where none that agrees better is near, as beside the rim of a bore.
         """
         where = np.ascontiguousarray(points, dtype=np.float64)
         squared, index, _ = self._tree.squared_distance(self.vertices, self.faces, where)
@@ -74,7 +79,24 @@ class PartSurface(Brief):
         given = np.ascontiguousarray(normals, dtype=np.float64)
         given = given / np.maximum(np.linalg.norm(given, axis=1, keepdims=True), np.finfo(np.float64).tiny)
         starts, around = self._around
-        return _best_aligned(where, given, reach, found, self.vertices, self.faces, self.normals, starts, around)
+        best = _best_aligned(where, given, reach, found, self.vertices, self.faces, self.normals, starts, around)
+        aside = np.flatnonzero(np.sum(self.normals[best] * given, axis=1) < ASIDE)
+        cells = np.unique(np.round(_ALIKE * given[aside]), axis=0, return_inverse=True)[1].ravel()
+        for cell in range(cells.max(initial=-1) + 1):
+            own = aside[cells == cell]
+            best[own] = self._facing(where[own], given[own], best[own])
+        return best
+
+    def _facing(self, points: Array, normals: Array, best: IntArray) -> IntArray:
+        """Return the triangles (k,) near points (k, 3) that face as normals (k, 3), all much alike; else `best`."""
+        middle = normals.mean(axis=0)
+        rows = np.flatnonzero(self.normals @ (middle / np.linalg.norm(middle)) > 0.5 * ASIDE)
+        if not len(rows):
+            return best
+        squared, index, _ = igl.point_mesh_squared_distance(points, self.vertices, self.faces[rows])
+        found = rows[np.asarray(index).ravel()]
+        fine = np.sqrt(np.asarray(squared).ravel()) <= FAR * self._diagonal
+        return np.where(fine & (np.sum(self.normals[found] * normals, axis=1) >= ASIDE), found, best)
 
     def flood(self, triangle: int, angle: float = SHARP) -> IntArray:
         """Return the triangles (k,), ascending, reached from one across edges that bend by less than `angle` degrees.
