@@ -156,7 +156,7 @@ class Config:
         Raises ValueError for a number that is not whole or not positive.
         """
         if blocks is not None and (not isinstance(blocks, Integral) or isinstance(blocks, bool) or blocks < 1):
-            raise ValueError(f"blocks must be None or a whole number from 1 on, got {blocks!r:.80}")
+            raise ValueError(f"blocks must be auto (None in Python) or a whole number from 1 on, got {blocks!r:.80}")
         return replace(self, blocks=blocks)
 
     def with_control_points(self, n: int) -> Config:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .arrays import IntArray
+from .arrays import IntArray, in_brackets
 from .attempts import attempts
 from .carrying import carried
 from .certificate.body import BodyCertificate, certify
@@ -270,14 +270,19 @@ def given_corners(surface: Surface, corners: ArrayLike | None, config: Config) -
 def corner_vertices(surface: Surface, corners: ArrayLike) -> IntArray:
     """Return the vertices (8,) of given corners: 8 vertex numbers, or (8, 3) points that take their nearest ones.
 
-    Raises ValueError unless these are eight different vertices.
+    Raises ValueError unless these are eight different vertices, and for points farther away than the surface is long.
     """
     given = np.asarray(corners)
     if given.shape == (8, 3):
         if not np.all(np.isfinite(given.astype(np.float64))):
             raise ValueError("corners: the coordinates must be finite")
         gaps = np.linalg.norm(surface.vertices[:, None] - given.astype(np.float64), axis=2)
-        numbers = gaps.argmin(axis=0)
+        numbers, far = gaps.argmin(axis=0), int(gaps.min(axis=0).argmax())
+        if (away := float(gaps[:, far].min())) > float(np.linalg.norm(np.ptp(surface.vertices, axis=0))):
+            raise ValueError(
+                f"corners: {in_brackets(given[far])} is {away:.3g} away from the surface, farther than this is long: "
+                "give places on the surface, in its units"
+            )
     elif given.shape == (8,) and given.dtype.kind in "iu":
         numbers = given.astype(np.int64)
     else:

@@ -269,3 +269,11 @@ def test_what_is_no_body_with_its_boundary_is_refused():
         measure(body, *given, inside, certify(body), check_boundary(body))
     with pytest.raises(ValueError, match="there is no patch 2"):
         measure(body, *given, replace(outer, patches=outer.patches + 1), certify(body), check_boundary(body))
+
+
+def test_nearest_places_on_edges_do_not_leave_the_cube_by_rounding():
+    volume = BSplineVolume.from_function(lambda u, v, w: (u + 0.1 * v, v - 0.2 * w, w + 0.05 * u), 7, 3)
+    places, rows = np.random.default_rng(0).uniform(size=(20_000, 3)), np.arange(20_000)
+    places[rows, rows % 3], places[rows, (rows + 1) % 3] = np.round(places[rows, rows % 3]), 1.0
+    found = nearest_on_boundary(volume(places), volume, SampledBoundary.of(volume))[1]
+    assert found.min() == 0.0 and found.max() == 1.0

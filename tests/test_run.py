@@ -287,6 +287,9 @@ def test_given_corners_are_honoured(surface):
 
 
 def test_bad_corners_are_refused(surface):
+    far = np.argwhere(np.ones((2, 2, 2))) * 1000.0
+    with pytest.raises(ValueError, match=r"corners: \(1000, 1000, 1000\) is .* away .* farther"):
+        parameterize(surface, tiny_config(), corners=far)
     with pytest.raises(ValueError, match="8 vertex numbers or 8 points"):
         parameterize(surface, tiny_config(), corners=np.zeros((4, 3)))
     with pytest.raises(ValueError, match="8 vertex numbers or 8 points"):
@@ -296,7 +299,7 @@ def test_bad_corners_are_refused(surface):
     with pytest.raises(ValueError, match="same vertex"):
         corner_vertices(surface, [0, 1, 2, 3, 4, 5, 6, 6])
     with pytest.raises(ValueError, match="same vertex"):
-        corner_vertices(surface, np.zeros((8, 3)))
+        corner_vertices(surface, np.tile(surface.vertices[0], (8, 1)))
     with pytest.raises(ValueError, match="finite"):
         corner_vertices(surface, np.full((8, 3), np.nan))
 

@@ -67,7 +67,7 @@ def test_interrupted_and_resumed_gives_the_same_blocks(ring, options, undisturbe
     [
         ("1", "ring: genus 1: one cube is never mapped one-to-one onto a body with handles; allow more"),
         ("2", "ring: the skeleton needs 4 blocks, and at most 2 are allowed: allow more"),
-        ("0", "blocks must be None or a whole number from 1 on, got 0"),
+        ("0", "blocks must be auto (None in Python) or a whole number from 1 on, got 0"),
     ],
 )
 def test_blocks_that_cannot_be_are_refused_in_one_line(ring, in_folder, capsys, blocks, says):

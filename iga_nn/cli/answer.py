@@ -50,7 +50,9 @@ def verdict_in_words(outcome: Outcome) -> str:
         lines += [f"{first:16s} {line}" for first, line in zip_longest([title][: len(found)], found, fillvalue="")]
     lines += [*levels[:-1], f"{rounded(verdict['seconds'], 1)} s", *advice.in_words(outcome.report)]
     proved = f"{reports.claim(outcome.report)} {verdict['bijective']}; one-to-one: {verdict['one_to_one']}"
-    ending = {"verdict": proved, "error": "".join(levels[-1:]), "open": str(outcome.folder / PAGE)}
+    errors = any(level.get(key) is not None for level in verdict.get("levels", [])[-1:] for key in SHOWN_ERRORS)
+    last = "error" if errors else "solved"  # of several blocks without an exact solution no error is known
+    ending = {"verdict": proved, last: "".join(levels[-1:]), "open": str(outcome.folder / PAGE)}
     return "\n".join([*lines, *(f"{name:16s} {text}" for name, text in ending.items() if text)])
 
 

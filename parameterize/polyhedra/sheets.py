@@ -15,6 +15,7 @@ from ..arrays import Array, IntArray
 from ..surface.geometry import connected
 from .arrangement import Arrangement, Facet
 
+_LEAST = 1e-300  # divides lengths of facets that rounding has left without area: they have no direction
 _STRAIGHT = 1e-4  # radians: sheets and faces that differ less from one plane are in one
 _WIDEST = 0.56 * np.pi  # an angle between two sheets at a re-entrant edge that is left, little above a right angle:
 # at wider ones the cells of a flat pyramid and of the block below it would become one
@@ -131,8 +132,8 @@ def _across(found: Arrangement, edge: Edge, ids: tuple[int, ...]) -> Array:
     """Return the unit vector (3,) in a facet that leads away from one of its edges."""
     along = found.points[edge[1]] - found.points[edge[0]]
     away = found.points[list(ids)].mean(axis=0) - found.points[edge[0]]
-    away = away - (away @ along) / (along @ along) * along
-    return np.asarray(away / np.linalg.norm(away))
+    away = away - (away @ along) / max(float(along @ along), _LEAST) * along
+    return np.asarray(away / max(float(np.linalg.norm(away)), _LEAST))
 
 
 def _angle(found: Arrangement, edge: Edge, ids: tuple[int, ...], start: tuple[Array, Array]) -> float:
@@ -149,7 +150,7 @@ def _widest(angles: list[float]) -> float:
 def _normal(points: Array) -> Array:
     """Return the unit normal (3,) of a plane polygon (k, 3), by Newell's sum."""
     normal = np.cross(points - points[0], np.roll(points, -1, axis=0) - points[0]).sum(axis=0)
-    return np.asarray(normal / np.linalg.norm(normal))
+    return np.asarray(normal / max(float(np.linalg.norm(normal)), _LEAST))
 
 
 def _sheets(inner: list[Facet]) -> IntArray:

@@ -53,7 +53,9 @@ def nearest_on_boundary(
     """
     _, triangle, weights = closest_triangles(points, boundary.points, boundary.triangles)
     corners = boundary.triangles[triangle]  # (m, 3)
-    where = np.einsum("mk,mka->ma", weights, boundary.parameters[corners])
+    where = np.clip(
+        np.einsum("mk,mka->ma", weights, boundary.parameters[corners]), 0.0, 1.0
+    )  # weights sum to 1 roughly
     axis, _ = axis_and_side(boundary.cube_faces[triangle])
     every = np.arange(len(points))
     where[every, axis] = boundary.parameters[corners[:, 0], axis]
