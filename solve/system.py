@@ -42,6 +42,23 @@ CONTINUOUS = "the error is not estimated: across interfaces of patches the gradi
 log = logging.getLogger(__name__)
 
 Preconditioner = FastDiagonalization | GluedPreconditioner
+TOLD = 10.0  # seconds between two lines on the iterations
+
+
+class _Told:
+    """Applies a product, and logs every ten seconds how often it has."""
+
+    def __init__(self, product: Callable[[Array], Array], speaks: bool) -> None:
+        self._product, self._speaks, self._count = product, speaks, 0
+        self._start = self._last = time.monotonic()
+
+    def __call__(self, x: Array) -> Array:
+        now = time.monotonic()
+        if self._speaks and now - self._last >= TOLD:
+            self._last = now
+            log.info("solving: %d iterations in %.0f seconds", self._count, now - self._start)
+        self._count += 1
+        return self._product(x)
 
 
 @dataclass(frozen=True, eq=False)
@@ -283,7 +300,7 @@ class System:
             assert isinstance(operator, Operator) and isinstance(block, FastDiagonalization)
             return solve_on_device(operator, block, self.right, *limits, options.device, guess)
         if self.problem.form.symmetric:
-            system = self.product, self.right, self.precondition
+            system = _Told(self.product, self.space.rank == 0), self.right, self.precondition
             return conjugate_gradients(*system, *limits, guess, self.space.total)
         if isinstance(self.unknowns, Glued):
             return generalized_residuals(self.product, self.right, self.precondition, *limits)

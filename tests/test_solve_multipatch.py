@@ -251,3 +251,11 @@ def test_a_face_that_holds_a_patch_by_rounding_alone_leaves_it_free():
     law = iga_nn.Elasticity(roller="ny < -0.999", fix="nz < -0.999", load={"nx > 0.99": (0, 0, 1)})
     report = iga_nn.solve(iga_nn.MultiPatch.from_patches([part(0.0, 8.0), part(8.0, 50.0)]), law, refine=0).report
     assert report.converged and report.iterations < 150
+
+
+def test_a_long_solve_says_how_far_it_is(monkeypatch, caplog):
+    monkeypatch.setattr("solve.system.TOLD", 0.0)
+    with caplog.at_level("INFO", "solve"):
+        report = iga_nn.solve(two(2, 2), iga_nn.Poisson(exact=WAVE)).report
+    lines = [record.getMessage() for record in caplog.records if "iterations in" in record.getMessage()]
+    assert lines[-1] == f"solving: {report.iterations - 1} iterations in 0 seconds"

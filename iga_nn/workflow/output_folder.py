@@ -238,5 +238,5 @@ def _way_on(folder: Path) -> str:
     if has_checkpoint(folder):
         return "the same command with --resume continues from the checkpoint"
     if (folder / "volume.npz").exists():
-        return f"the volume is written: `iga-nn solve poisson {folder / 'volume.npz'}` solves on it"
+        return f"the volume is written: `iga-nn solve` with {folder / 'volume.npz'} solves on it"
     return "nothing was computed yet that could be resumed"

@@ -42,11 +42,13 @@ def weak_faces(volume: BSplineVolume, problem: BoundaryValueProblem, space: Tria
     """
     if len(problem.conditions) > MOST:
         raise ValueError(f"at most {MOST} regions, got {len(problem.conditions)}")
+    frames = [condition.region.frame for condition in problem.conditions]
+    length = next((frame.length for frame in frames if frame is not None), None)
     found = []
     for name in FACE_NAMES:
         if name not in space.dirichlet and has_face(space, name):
             axis, side = axis_side(name)
-            rule = surface_rule(volume, space, axis, side, _coder(problem, name))
+            rule = surface_rule(volume, space, axis, side, _coder(problem, name), length)
             if rule is not None:
                 found.append(_Builder(volume, problem, space, name, rule).face())
     return found

@@ -22,7 +22,7 @@ Mask = NDArray[np.bool_]
 Codes = Callable[[Array, Array], IntArray]  # of points (3, m) and outward unit normals (3, m)
 
 SAMPLES = 5  # points a direction at which a cell's code is evaluated, its ends included
-FEWEST = 120  # of these a direction and face, so that a mesh of few spans is sampled as finely as one of many
+FEWEST = 120  # of these a direction on a face of a body of one cube, so that few spans are sampled as finely as many
 PIECES = 8  # intervals of a line, each searched for a jump
 BISECTIONS = 20
 TOLERANCE = 1e-4  # share of the area of a face's regions by which it may be wrong
@@ -73,13 +73,20 @@ class SurfaceRule:
     codes: IntArray
 
 
-def surface_rule(volume: BSplineVolume, space: TrialSpace, axis: int, side: int, codes: Codes) -> SurfaceRule | None:
+def surface_rule(
+    volume: BSplineVolume, space: TrialSpace, axis: int, side: int, codes: Codes, length: float | None = None
+) -> SurfaceRule | None:
     """Return the rule of a face, without the points whose code is zero; None where all codes are zero.
+
+    length: the cube root of the body's volume; faces that are smaller, as those of many blocks, are looked at no more
+    closely than those of one cube.
 
     Cells in which lines differ are halved until their usual error is within TOLERANCE of the regions' area. For a slab,
     the points are those of the whole face's rule that lie on its spans, so that they do not depend on the processes.
     """
-    whole = _Cutter(volume, orientation(volume), space.whole, axis, side, codes).rule()
+    size = float(np.linalg.norm(np.ptp(volume.face(axis, side).reshape(-1, 3), axis=0)))
+    share = 1.0 if length is None else min(1.0, size / (np.sqrt(2.0) * length))
+    whole = _Cutter(volume, orientation(volume), space.whole, axis, side, codes, int(np.ceil(share * FEWEST))).rule()
     if whole is None or space.whole is space:
         return whole
     u, (first, *_, last) = whole.at.parameters[:, 0], space.breaks[0]
@@ -94,11 +101,12 @@ class _Cutter:
     axis: int
     side: int
     codes: Codes
+    fewest: int
 
     def rule(self) -> SurfaceRule | None:
         """Return the quadrature rule of the face."""
         cells, parts, covered = self._spans(), [], 0.0
-        samples = max(SAMPLES, -(-FEWEST // int(len(cells) ** 0.5)))
+        samples = max(SAMPLES, -(-self.fewest // int(len(cells) ** 0.5)))
         for halvings in range(HALVINGS + 1):
             seen = self._seen(cells, samples)
             constant = (seen == seen[:, :1, :1]).all(axis=(1, 2))
