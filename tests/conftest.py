@@ -134,6 +134,14 @@ def few_distances(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(SampledBoundary.of.__func__, "__defaults__", FEW)
 
 
+@pytest.fixture
+def coarse_regions(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Integrate conditions on regions coarsely, where not the numbers are looked at."""
+    from coarse_rims import coarse_rims
+
+    coarse_rims(monkeypatch.setattr)
+
+
 @pytest.fixture(scope="module")
 def trained() -> dict[Any, Any]:
     """What short trainings of a file have found: what is asked for again would be the same bits."""
@@ -141,19 +149,16 @@ def trained() -> dict[Any, Any]:
 
 
 @pytest.fixture
-def short_training(monkeypatch: pytest.MonkeyPatch, few_distances: None, trained: dict[Any, Any]) -> None:
-    """Train and optimise for about a second wherever a training is asked for, with at most 8 control points.
-
-    What is then solved on regions is integrated coarsely.
-    """
-    from coarse_rims import coarse_rims
+def short_training(
+    monkeypatch: pytest.MonkeyPatch, few_distances: None, coarse_regions: None, trained: dict[Any, Any]
+) -> None:
+    """Train and optimise for about a second wherever a training is asked for, with at most 8 control points."""
     from small_run import shortened
 
     import iga_nn
     import parameterize.run as home
     from parameterize.config import preset
 
-    coarse_rims(monkeypatch.setattr)
     full = iga_nn.parameterize  # loaded before it is replaced: else what replaces it would be put back
     defaults = {name: one.default for name, one in list(inspect.signature(full).parameters.items())[2:]}
 
