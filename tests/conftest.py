@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import inspect
 import os
 import shutil
 import signal
@@ -133,6 +134,14 @@ def few_distances(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(SampledBoundary.of.__func__, "__defaults__", FEW)
 
 
+@pytest.fixture
+def coarse_regions(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Integrate conditions on regions coarsely, where not the numbers are looked at."""
+    from coarse_rims import coarse_rims
+
+    coarse_rims(monkeypatch.setattr)
+
+
 @pytest.fixture(scope="module")
 def trained() -> dict[Any, Any]:
     """What short trainings of a file have found: what is asked for again would be the same bits."""
@@ -140,7 +149,9 @@ def trained() -> dict[Any, Any]:
 
 
 @pytest.fixture
-def short_training(monkeypatch: pytest.MonkeyPatch, few_distances: None, trained: dict[Any, Any]) -> None:
+def short_training(
+    monkeypatch: pytest.MonkeyPatch, few_distances: None, coarse_regions: None, trained: dict[Any, Any]
+) -> None:
     """Train and optimise for about a second wherever a training is asked for, with at most 8 control points."""
     from small_run import shortened
 
@@ -149,13 +160,14 @@ def short_training(monkeypatch: pytest.MonkeyPatch, few_distances: None, trained
     from parameterize.config import preset
 
     full = iga_nn.parameterize  # loaded before it is replaced: else what replaces it would be put back
+    defaults = {name: one.default for name, one in list(inspect.signature(full).parameters.items())[2:]}
 
     @functools.wraps(full)
     def parameterize(surface: Any, config: Any = None, when_made: Any = None, **options: Any) -> Any:
         short = shortened(config or preset("fast"))
         short = short.with_control_points(min(8, short.spline.control_points))
-        changes_nothing = ("progress", "checkpoint_dir")
-        given = {name: str(value) for name, value in options.items() if name not in changes_nothing}
+        changes_nothing = ("progress", "when_made", "checkpoint_dir")
+        given = {name: str(value) for name, value in (defaults | options).items() if name not in changes_nothing}
         asked = (surface.name, surface.sha256, short, *sorted(given.items()))
         if asked not in trained:
             trained[asked] = full(surface, short, **options)

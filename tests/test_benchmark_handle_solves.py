@@ -15,7 +15,7 @@ def one_map(tmp_path):
     return tmp_path
 
 
-def test_rates_works_and_iterations_are_measured_beside_a_cube(one_map):
+def test_rates_works_and_iterations_are_measured_beside_a_cube(one_map, coarse_regions):
     assert benchmark.main([str(one_map), "--laws", "poisson", "clamped", "--out", str(one_map / "out")]) == 0
     with (one_map / "out" / "handle_solves.csv").open() as file:
         rows = list(csv.DictReader(file))

@@ -7,6 +7,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from coarse_rims import coarse_rims
 from example_files import load
 from mpi_cases import cases
 from mpi_job import mpiexec
@@ -28,7 +29,9 @@ SPACES = {
 @pytest.fixture(scope="module")
 def alone():
     """Name -> solution of a single process."""
-    return {name: solve_problem(volume, p, threads=1, **how) for name, (volume, p, how) in cases().items()}
+    with pytest.MonkeyPatch.context() as patch:
+        coarse_rims(patch.setattr)  # as in the job
+        return {name: solve_problem(volume, p, threads=1, **how) for name, (volume, p, how) in cases().items()}
 
 
 @pytest.fixture(scope="module")

@@ -51,6 +51,7 @@ def served(folder):
         "TRAME_DEFAULT_HOST": "0.0.0.0",
         "TRAME_ARGS": "--host 0.0.0.0",
         "TMPDIR": str(folder),
+        "VTK_DEFAULT_OPENGL_WINDOW": "none",  # jobs draw no figures: the browser draws what is looked at here
     }
     command = [sys.executable, "-m", "iga_nn", "app", "--port", "0", "--max-upload", "1", *QUICK]
     terminal = folder / "stderr"

@@ -96,7 +96,7 @@ def test_density_and_units():
 
 def test_a_free_beam_leaves_out_its_rigid_motions():
     """The first bending of a free beam is 4.7300^2 / (2 pi L^2) sqrt(E I / rho A), less what shear takes."""
-    found = iga_nn.modes(box(20.0, 1.0, 1.0, (16, 4, 4)), body(FACES), n=2)
+    found = iga_nn.modes(box(20.0, 1.0, 1.0, (10, 4, 4)), body(FACES), n=2)
     known = 4.7300**2 / (2.0 * np.pi) * np.sqrt(100.0 / 12.0) / 20.0**2
     assert found.rigid == 6
     assert found.frequencies == pytest.approx([known, known], rel=0.02) and found.frequencies[0] < known

@@ -13,13 +13,15 @@ from solve.study import benchmark_volume
 
 @pytest.fixture(scope="module")
 def runs(tmp_path_factory):
-    """Two solves of one body in tension, the second of half the stiffness and in other units of stress."""
+    """Two solves of one body in tension, the second of half the stiffness and in other units of stress; no figures."""
     folder = tmp_path_factory.mktemp("runs")
     benchmark_volume(2).save(folder / "map.npz")
     load = ["--traction", "u1=1;0;0", "v0=0", "v1=0", "w0=0", "w1=0", "--refine", "0", "--quiet", "--unit", "mm"]
-    for name, young, stress in (("stiff", "200", "MPa"), ("soft", "100", "N/mm2")):
-        given = ["--young", young, "--stress-unit", stress, "--out", str(folder / name)]
-        assert main(["solve", "elasticity", str(folder / "map.npz"), *load, *given]) == 0
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("iga_nn.figures.render.can_draw", lambda: False)
+        for name, young, stress in (("stiff", "200", "MPa"), ("soft", "100", "N/mm2")):
+            given = ["--young", young, "--stress-unit", stress, "--out", str(folder / name)]
+            assert main(["solve", "elasticity", str(folder / "map.npz"), *load, *given]) == 0
     return folder / "stiff", folder / "soft"
 
 

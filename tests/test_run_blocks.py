@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import trimesh
 from block_starts import torus
+from conftest import told
 
 import parameterize.starts.blocks as starts
 from iga_nn.cli.commands import main
@@ -76,7 +77,15 @@ def test_blocks_that_cannot_be_are_refused_in_one_line(ring, in_folder, capsys, 
     assert " ".join(capsys.readouterr().err.split()).endswith(says)
 
 
-def test_a_run_of_blocks_is_reported(ring, in_folder, few_distances):
+def test_a_run_of_blocks_is_reported(ring, undisturbed, in_folder, few_distances, monkeypatch):
+    """The command asks for what is there already: the same surface and options."""
+
+    def known(surface, config, *, when_made=None, **_):
+        assert np.array_equal(surface.vertices, ring.vertices) and np.array_equal(surface.faces, ring.faces)
+        assert config == undisturbed.config
+        return told(undisturbed, when_made)
+
+    monkeypatch.setattr("parameterize.run.parameterize", known)
     write_obj(ring, "ring.obj")
     arguments = ["run", "poisson", "ring.obj", "--exact=x*y", "--refine", "0", "--steps-factor", "0.4", "--out", "out"]
     assert main(arguments) == 0

@@ -53,7 +53,7 @@ def test_wrong_entries_are_refused_in_one_line(options, says):
     assert "\n" not in str(caught.value)
 
 
-def test_a_run_holds_and_loads_faces_of_the_part(formula_training, in_folder, capsys):
+def test_a_run_holds_and_loads_faces_of_the_part(formula_training, in_folder, capsys, coarse_regions):
     formula_training()
     assert main(["run", "elasticity", "cube", *PULLED, "--refine", "0", "--out", "out", "--quiet"]) == 0
     level = json.loads((in_folder / "out" / "report.json").read_text())["elasticity"]["levels"][0]

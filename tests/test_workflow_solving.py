@@ -18,7 +18,7 @@ BODY = ["--fix", "z < 1e-6", "--load", "nz > 0.9 and x < 1/2=0;0;-2", "--unit", 
 
 
 @pytest.mark.pictures
-def test_regions_and_reactions_are_told_in_terminal_report_and_page(in_folder, capsys):
+def test_regions_and_reactions_are_told_in_terminal_report_and_page(in_folder, capsys, coarse_regions):
     """A cube of side 1, held below and pressed on half of its top: load -1, which the fixed face answers."""
     grid = np.stack(np.meshgrid(*[np.linspace(0, 1, 5)] * 3, indexing="ij"), axis=-1)
     iga_nn.BSplineVolume.uniform(grid).save("cube.npz")

@@ -11,6 +11,7 @@ import sys
 from pathlib import Path
 
 import numpy as np
+from coarse_rims import coarse_rims
 from rational_shapes import quarter_ring
 from volumes import mapped
 
@@ -83,6 +84,7 @@ def groups(ranks):
 def main(folder):
     from mpi4py import MPI
 
+    coarse_rims(setattr)
     world = MPI.COMM_WORLD
     for sizes in groups(world.size):
         group = int(np.searchsorted(np.cumsum(sizes), world.rank, side="right"))
