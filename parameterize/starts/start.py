@@ -7,6 +7,9 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, Literal
 
+import igl
+import numpy as np
+
 from ..arrays import Array, IntArray, in_brackets
 from ..blocks.layout import SPANS, BlockLayout, LayoutError, block_layout
 from ..checkpoint import Checkpoints
@@ -21,6 +24,7 @@ from ..handles.pieces import Handle, handles_of
 from ..optimization.endings import Course
 from ..optimization.optimized import Optimized
 from ..optimization.phases import Schedule
+from ..optimization.reassignment import boundary_samples
 from ..optimization.sliding import SlidingParameters
 from ..optimization.surface_distance import TANGENTIAL, SurfaceFit
 from ..optimization.term import Weights
@@ -43,6 +47,7 @@ _log = logging.getLogger(__name__)
 FEWEST_SPANS = 4  # across a block: with fewer its section cannot become round
 COMPACT = 4.0  # cubed area of the surface over 36 pi, at volume 1: bodies with less have no long limbs, and most have
 # less, so that these need not wait for a skeleton
+_A_SPAN = 4  # samples of the boundary, of which the distance back to the surface is taken
 _CELL = 0.03  # of the lattice whose points tell the areas of sections, at volume 1
 FEW_EDGES = 4.0  # length at volume 1 of sharp edges: less is an eye or a mouth; the rim of a half ball has 5, a cube 12
 PIECE = 0.25  # length at volume 1: a coarse mesh of a smooth body has sharp edges in shorter pieces
@@ -236,6 +241,16 @@ class Attempt:
     def distance(self) -> float:
         """Return the root mean square distance of the surface's points from the map, at volume 1."""
         return math.sqrt(self.fit.mean_square(self.found.spline.control))
+
+    @cached_property
+    def distance_back(self) -> float:
+        """Return the root mean square distance of the map's boundary from the surface, at volume 1.
+
+        It is large where the map spans a hollow of the surface, whose points are not far from it.
+        """
+        samples = boundary_samples(self.found.spline, _A_SPAN)
+        squares = igl.point_mesh_squared_distance(samples.points, self.fit.points, self.fit.places.triangles)[0]
+        return math.sqrt(np.average(squares, weights=samples.areas))
 
     @property
     def rank(self) -> tuple[int, bool, bool, float]:
