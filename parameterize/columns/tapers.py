@@ -22,6 +22,8 @@ _LEAST = 1e-3  # of a section's width, from one end of a slab to the other: a si
 
 _LEANS = 1e-6  # of a section's width, from one end of a slab to the other: less is upright
 
+Side = list[tuple[int, tuple[Loop, Loop]]]  # the numbers of slabs that follow each other, and a loop's ends in each
+
 
 @dataclass(frozen=True, eq=False)
 class _Slab:
@@ -134,13 +136,13 @@ def _upright(slabs: Sequence[_Slab], frame: Array, near: float) -> Stack | None:
     )
 
 
-def _sides(slabs: Sequence[_Slab], near: float) -> list[list[tuple[int, tuple[Loop, Loop]]]]:
+def _sides(slabs: Sequence[_Slab], near: float) -> list[Side]:
     """Return the sides: loops that follow each other from slab to slab, with their corners in one order."""
-    done: list[list[tuple[int, tuple[Loop, Loop]]]] = []
-    open_: list[list[tuple[int, tuple[Loop, Loop]]]] = []
+    done: list[Side] = []
+    open_: list[Side] = []
     for k, slab in enumerate(slabs):
         left = list(slab.loops)
-        going: list[list[tuple[int, tuple[Loop, Loop]]]] = []
+        going: list[Side] = []
         for side in open_:
             found = _following(side[-1][1][1], [loop[0] for loop in left], near)
             if found is None:
