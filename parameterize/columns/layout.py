@@ -58,7 +58,7 @@ def columns_of(
     vertices: (n, 3), faces: (m, 3), of a closed surface. spans: across a block that is a cube. most: blocks, at most.
     sharp: the angle in degrees above which outlines have a corner.
     """
-    stack = stack_of(vertices, faces) or tapered_stack_of(vertices, faces)
+    stack = stack_of(vertices, faces) or tapered_stack_of(vertices, faces, sharp)
     if stack is None:
         return None
     diagonal = float(np.linalg.norm(np.ptp(vertices, axis=0)))

@@ -12,6 +12,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..arrays import Array, IntArray
+from ..surface.features import SHARP
 from ..surface.geometry import doubled_areas, signed_volume
 from .fields import Field
 from .lines import straightened
@@ -40,8 +41,11 @@ class _Slab:
         return (self.high - self.low) * sum(a + 4.0 * m + b for a, m, b in ends) / 6.0
 
 
-def tapered_stack_of(vertices: Array, faces: IntArray) -> Stack | None:
-    """Return a closed surface, vertices (n, 3), faces (m, 3), as a stack with leaning sides; None where it is none."""
+def tapered_stack_of(vertices: Array, faces: IntArray, sharp: float = SHARP) -> Stack | None:
+    """Return a closed surface, vertices (n, 3), faces (m, 3), as a stack with leaning sides; None where it is none.
+
+    A coarse mesh of a smooth body of revolution is none: most rims of a stack are sharper than `sharp`, in degrees.
+    """
     near, volume = nearness(vertices), signed_volume(vertices, faces)
     for axis in axes_of(doubled_areas(vertices, faces)):
         frame = frame_of(axis)
@@ -49,8 +53,8 @@ def tapered_stack_of(vertices: Array, faces: IntArray) -> Stack | None:
         slabs = _slabs(points, faces, near)
         if slabs is None or abs(sum(slab.volume for slab in slabs) - volume) > SAME * volume:
             continue
-        found = _upright(slabs, frame, near)
-        if found is not None:
+        sides = _sides(slabs, near)
+        if _rims_are_sharp(slabs, sides, sharp) and (found := _upright(slabs, sides, frame, near)) is not None:
             return found
     return None
 
@@ -117,12 +121,24 @@ def _following(loop: Loop, others: Sequence[Loop], near: float) -> tuple[int, In
     return None
 
 
-def _upright(slabs: Sequence[_Slab], frame: Array, near: float) -> Stack | None:
+def _rims_are_sharp(slabs: Sequence[_Slab], sides: Sequence[Side], sharp: float) -> bool:
+    """Return whether most of the rims at which sides end, by length, turn into a level by more than an angle."""
+    total = kept = 0.0
+    for side in sides:
+        for k, loops, end in ((*side[0], 0), (*side[-1], 1)):
+            length = float(np.linalg.norm(np.diff(loops[end], axis=0, append=loops[end][:1]), axis=1).sum())
+            lean = float(np.linalg.norm(loops[1] - loops[0], axis=1).mean())
+            total += length
+            kept += length * bool(np.degrees(np.arctan2(slabs[k].high - slabs[k].low, lean)) > sharp)
+    return kept > 0.5 * total
+
+
+def _upright(slabs: Sequence[_Slab], sides: Sequence[Side], frame: Array, near: float) -> Stack | None:
     """Return the stack of extrusions and the fields at its levels; None where two sides would need different ones."""
     heights = np.array([slabs[0].low, *(slab.high for slab in slabs)])
     profiles: list[list[Loop]] = [[] for _ in slabs]
     moved: list[list[tuple[Loop, Loop]]] = [[] for _ in heights]  # of each level, loops and where they belong
-    for side in _sides(slabs, near):
+    for side in sides:
         upright = _reference([(slabs[k], *loops) for k, loops in side])
         for k, (low, high) in side:
             profiles[k].append(upright)
