@@ -62,8 +62,7 @@ def next_start(tried: tuple[Tried, ...], starts: tuple[Start, ...]) -> Start | N
 def _serves(one: Tried) -> bool:
     """Return whether a map has no faults, and, where it has blocks, is close to the surface: one cube may be closer.
 
-    It is on a hand whose fingers stay webbed in blocks, 0.013 from the surface at samples of the boundary.
-
+    On a hand whose blocks span the slits between the fingers, 0.013 away back from the boundary, one cube is closer.
     Of a map with its edges on sharp edges it is also proved that the boundary does not meet itself.
     """
     if one.attempt is None or any(one.attempt.found.faults):

@@ -87,7 +87,9 @@ def opposite(network: Network, region: Region) -> Array:
         if not side.is_straight:
             half = side.halves(-1)[1]
             point, (x, y) = half.points[0], half.tangents[0]
-            found.append(point + rim.across(point, np.array([-y, x])) * np.array([-y, x]))
+            way = np.array([-y, x])
+            if np.isfinite(far := rim.across(point, way)):
+                found.append(point + far * way)
     return np.array(found).reshape(-1, 2)
 
 

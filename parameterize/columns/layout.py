@@ -56,7 +56,7 @@ def columns_of(
     """Return blocks that fill a stack of extrusions, and are proved to be one-to-one; None where there are none.
 
     vertices: (n, 3), faces: (m, 3), of a closed surface. spans: across a block that is a cube. most: blocks, at most.
-    sharp: the angle in degrees above which outlines have a corner.
+    sharp: the angle in degrees above which outlines have a corner, and rims are those of a stack with leaning sides.
     """
     stack = stack_of(vertices, faces) or tapered_stack_of(vertices, faces, sharp)
     if stack is None:

@@ -42,10 +42,9 @@ def straightened(loop: Loop, near: float) -> IntArray:
         if _off(closed[first + 1 : last], closed[first], closed[last]).max() > 0.5 * near:
             first = last - 1
             kept.append(first)
-    for k, last in enumerate(
-        [*kept[2:], len(loop)][: len(kept) - 1], 1
-    ):  # a point just beside a corner may have been taken for it
-        first = kept[k - 1]
+    ends = [*kept, len(loop)]
+    for k in range(1, len(kept)):  # a point just beside a corner may have been taken for it
+        first, last = kept[k - 1], ends[k + 1]
         off = _off(closed[first + 1 : last], closed[first], closed[last])
         kept[k] = first + 1 + int(np.round(off / near, 6).argmax())
     return (np.array(kept) + turn) % len(loop)

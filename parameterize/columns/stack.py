@@ -31,7 +31,7 @@ class Stack:
     frame : (3, 3) array
         Its rows are two directions across the axis, and the axis; right-handed.
     heights : (k + 1,) array
-        Of the faces across the axis, ascending.
+        Of the faces across the axis, and of the corners of sides that lean, ascending.
     profiles : tuple of k tuples of (m, 2) arrays
         Of each slab the polygons that bound it, as the section of the surface has them: outer ones counterclockwise.
     near : float
