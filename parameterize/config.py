@@ -184,7 +184,7 @@ def _stages(*steps: int) -> tuple[StageConfig, ...]:
     return tuple(map(StageConfig, get_args(StageName), steps))
 
 
-_FAST = Config("fast", NetworkConfig(scale=3.14), TrainConfig(), _stages(90, 60, 90, 30, 60), SplineConfig())
+_FAST = Config("fast", NetworkConfig(scale=3.14), TrainConfig(), _stages(90, 30, 45, 15, 30), SplineConfig())
 PRESETS = {
     "fast": _FAST,
     "grown": replace(_FAST, name="grown", train=replace(_FAST.train, easy_loss=0.0)),
