@@ -178,7 +178,7 @@ PARTS: dict[str, Part] = {
     "corners and edges": Part("the stages that hold corners and edges", no_stage("corners", "edges"), trained),
     "all but cube": Part("these three stages", no_stage("S(1)", "corners", "edges"), trained),
     "half the steps": Part("half of the steps after the first stage", share_of_steps(0.5), trained),
-    "two thirds": Part("two thirds of the steps after the first stage", share_of_steps(1.0 / 3.0), trained),
+    "third of the steps": Part("two thirds of the steps after the first stage", share_of_steps(1.0 / 3.0), trained),
     "turning": Part("the turn of the cube before growth", put(on_cube, best_turn=lambda *_: np.eye(3)), ON_SPHERE),
     "coarse rounds": Part(
         "first rounds on fewer control points",
