@@ -294,6 +294,7 @@ def compute_without(task: Task, number: int, batch: str) -> Ended:
     """Leave out the part that the folder names, and compute the surface; the worker computes no other part's."""
     global _left_out
     part = task.folder.parent.name
+    assert _left_out in (None, part), f"this worker has left out {_left_out} already"
     if _left_out is None and part != WHOLE:
         PARTS[part].leave_out()
     _left_out = part
