@@ -130,6 +130,7 @@ def share_machine_code(packages):
             shutil.copyfile(compiled, copy)
 
 
+@pytest.mark.slow
 def test_wheel_runs_in_an_environment_of_its_own(wheel, tmp_path):
     """Installed without its dependencies, which are those of this environment: nothing is downloaded.
 
