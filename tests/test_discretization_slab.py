@@ -48,7 +48,7 @@ def job(tmp_path_factory):
     return run
 
 
-JOBS = [(3, 1), (3, 2), (3, 3), *(pytest.param(7, ranks, marks=pytest.mark.slow) for ranks in (1, 2, 4, 7))]
+JOBS = [(3, 3), *(pytest.param(7, ranks, marks=pytest.mark.slow) for ranks in (1, 2, 4, 7))]
 
 
 @pytest.mark.parametrize(("processes", "ranks"), JOBS)

@@ -1,6 +1,6 @@
-"""Problems that groups of processes of an MPI job solve together: `mpiexec -n 3 python mpi_cases.py FOLDER`.
+"""Problems that groups of processes of an MPI job solve together: `mpiexec -n 7 python mpi_cases.py FOLDER`.
 
-Of 3 processes 1 and 2 are at work at the same time, then all; of 7 processes 1, 2 and 4, then all.
+Of 7 processes 1, 2 and 4 are at work at the same time, then all; 3 are one group.
 
 The first of each group writes, into a folder named after their number, NAME.npy, the coefficients of each problem, and
 found.json: the reports, and how many processes raised the error that the data of some of them cause.
@@ -77,8 +77,7 @@ def refused(comm):
 
 def groups(ranks):
     """The sizes of the groups that are at work at the same time, one after the other."""
-    first = [size for size in (1, 2, 4) if 2 * size <= ranks + 1]
-    return first, [ranks]
+    return ([1, 2, 4], [7]) if ranks == 7 else ([ranks],)
 
 
 def main(folder):
