@@ -85,14 +85,19 @@ def numbers(text):
     return np.array([float(part) for part in text.split(",")])
 
 
-def in_browser(chromium, folder, work):
-    """What a coroutine of a running browser returns."""
+@pytest.fixture(scope="module")
+def in_browser(chromium, tmp_path_factory):
+    """A function that returns what a coroutine of a browser returns; one Chromium is as new for each."""
 
-    async def all_of_it():
-        async with running(chromium, folder) as browser:
-            return await work(browser)
+    async def alone(browser, work):
+        async with browser.fresh() as one:
+            return await work(one)
 
-    return asyncio.run(all_of_it())
+    with asyncio.Runner() as runner:
+        started = running(chromium, tmp_path_factory.mktemp("browser"))
+        browser = runner.run(started.__aenter__())
+        yield lambda work: runner.run(alone(browser, work))
+        runner.run(started.__aexit__(None, None, None))
 
 
 async def opened(browser, file, width=1000, before=""):
@@ -143,7 +148,7 @@ def test_a_field_has_one_range_in_figure_and_view(monkeypatch):
     assert packed[10, 20, 30] / 65535 == pytest.approx(share, abs=1e-3)
 
 
-def test_view_shows_fields_in_the_colours_of_the_bar_and_one_section_at_a_time(chromium, solved, tmp_path):
+def test_view_shows_fields_in_the_colours_of_the_bar_and_one_section_at_a_time(in_browser, solved):
     async def work(browser):
         tab, seen = await opened(browser, solved / "report.html"), {}
         for name, script in {
@@ -157,7 +162,7 @@ def test_view_shows_fields_in_the_colours_of_the_bar_and_one_section_at_a_time(c
             seen[name] = await tab.value(PARTS)
         return seen, await tab.value("document.getElementById('where').textContent"), tab.complaints
 
-    seen, where, complaints = in_browser(chromium, tmp_path, work)
+    seen, where, complaints = in_browser(work)
     assert complaints == [] and where == "u = 0.100"
     table = np.rint(255 * colormaps[evaluate.MAP](np.arange(256))[:, :3])
 
@@ -177,7 +182,7 @@ def test_view_shows_fields_in_the_colours_of_the_bar_and_one_section_at_a_time(c
 
 
 @pytest.mark.slow
-def test_mouse_wheel_and_fingers_turn_move_and_enlarge(chromium, solved, tmp_path):
+def test_mouse_wheel_and_fingers_turn_move_and_enlarge(in_browser, solved):
     async def work(browser):
         tab = await opened(browser, solved / "report.html")
         x, y = await tab.value(
@@ -221,7 +226,7 @@ def test_mouse_wheel_and_fingers_turn_move_and_enlarge(chromium, solved, tmp_pat
         seen["turned"] = await size()
         return seen, hint, scrolled
 
-    seen, hint, scrolled = in_browser(chromium, tmp_path, work)
+    seen, hint, scrolled = in_browser(work)
     width = {name: box[2] - box[0] for name, box in seen.items()}
     assert hint and scrolled == 0 and np.array_equal(seen["first"], seen["scrolled"])
     assert width["smaller"] / width["first"] == pytest.approx(np.exp(-0.3), rel=0.02)
@@ -232,7 +237,7 @@ def test_mouse_wheel_and_fingers_turn_move_and_enlarge(chromium, solved, tmp_pat
 
 
 @pytest.mark.parametrize("width", [390, pytest.param(1400, marks=pytest.mark.slow)])
-def test_pages_fit_the_window(chromium, solved, tmp_path, width):
+def test_pages_fit_the_window(in_browser, solved, tmp_path, width):
     report = document.read(solved)
     rows = [Row(Entry("a_part.npz", "a_part.npz", solved), "certified", "", report)]
     rows += [Row(Entry("long_name_" * 9, "x", tmp_path / "x"), "refused", "3 edges belong to one face: " + "w" * 90)]
@@ -249,10 +254,10 @@ def test_pages_fit_the_window(chromium, solved, tmp_path, width):
             found.append(await tab.value(cut))
         return found
 
-    assert in_browser(chromium, tmp_path, work) == [True, 0, True, 0]
+    assert in_browser(work) == [True, 0, True, 0]
 
 
-def test_without_webgl_the_page_says_so_and_shows_a_picture(chromium, solved, tmp_path):
+def test_without_webgl_the_page_says_so_and_shows_a_picture(in_browser, solved):
     async def work(browser):
         tab = await opened(browser, solved / "report.html", before=WITHOUT_WEBGL)
         shown = "(e => e !== null && e.offsetParent !== null)(document.querySelector('%s'))"
@@ -262,11 +267,11 @@ def test_without_webgl_the_page_says_so_and_shows_a_picture(chromium, solved, tm
         pictures = await tab.value("document.querySelectorAll('figure img').length")
         return places, pictures == 0 or await tab.value(still), tab.complaints
 
-    places, still, complaints = in_browser(chromium, tmp_path, work)
+    places, still, complaints = in_browser(work)
     assert places == [True, False, False, False] and still and complaints == []
 
 
-def test_a_page_around_the_view_chooses_light_or_dark(chromium, solved, tmp_path):
+def test_a_page_around_the_view_chooses_light_or_dark(in_browser, solved):
     async def work(browser):
         tab, found = await opened(browser, solved / "report.html"), []
         for theme in ("dark", "light", "dark"):
@@ -275,10 +280,10 @@ def test_a_page_around_the_view_chooses_light_or_dark(chromium, solved, tmp_path
             found.append(await tab.value("getComputedStyle(document.body).backgroundColor"))
         return found
 
-    assert in_browser(chromium, tmp_path, work) == ["rgb(20, 25, 31)", "rgb(255, 255, 255)", "rgb(20, 25, 31)"]
+    assert in_browser(work) == ["rgb(20, 25, 31)", "rgb(255, 255, 255)", "rgb(20, 25, 31)"]
 
 
-def test_a_click_reads_the_field_the_error_and_the_place(chromium, tmp_path):
+def test_a_click_reads_the_field_the_error_and_the_place(in_browser, tmp_path):
     """u = x y + z^2 on a twisted cube: on the boundary, on a section of the cube, and on a plane of space."""
     volume, problem = benchmark_volume(2), solve.Poisson(exact="x*y+z*z")
     file = written(tmp_path, scene_of(volume, solve.solve_problem(volume, problem), problem))
@@ -294,7 +299,7 @@ def test_a_click_reads_the_field_the_error_and_the_place(chromium, tmp_path):
             assert numbers(by_key["x, y, z"]) == pytest.approx(numbers(seen[part]["x, y, z"]), abs=5e-3)
         return nothing, seen, await tab.value("document.getElementById('where').textContent"), tab.complaints
 
-    nothing, seen, where, complaints = in_browser(chromium, tmp_path, work)
+    nothing, seen, where, complaints = in_browser(work)
     assert complaints == [] and nothing == "Click the body to read the values there."
     for part, read in seen.items():
         (x, y, z), uvw = numbers(read["x, y, z"]), numbers(read["u, v, w"])
@@ -308,7 +313,7 @@ def test_a_click_reads_the_field_the_error_and_the_place(chromium, tmp_path):
     assert numbers(seen["x"]["x, y, z"])[0] == pytest.approx(float(where.split(" = ")[1]), abs=1e-3)
 
 
-def test_a_tap_reads_values_on_a_phone(chromium, tmp_path):
+def test_a_tap_reads_values_on_a_phone(in_browser, tmp_path):
     volume = benchmark_volume(1)
     file = written(tmp_path, scene_of(volume, solve.solve_problem(volume, solve.Poisson(exact="2+x"))))
 
@@ -323,12 +328,12 @@ def test_a_tap_reads_values_on_a_phone(chromium, tmp_path):
         await tab.until("document.querySelectorAll('.reading').length > 3")
         return await tab.value(READ), await tab.value("document.documentElement.scrollWidth")
 
-    read, width = in_browser(chromium, tmp_path, work)
+    read, width = in_browser(work)
     assert float(read["u"]) == pytest.approx(2 + numbers(read["x, y, z"])[0], abs=1e-3) and width == 390
 
 
 @pytest.mark.slow
-def test_a_page_around_the_view_hears_which_face_is_clicked_and_where(chromium, tmp_path):
+def test_a_page_around_the_view_hears_which_face_is_clicked_and_where(in_browser, tmp_path):
     volume = benchmark_volume(1)
     written(tmp_path, scene_of(volume))
     outer = "<script>addEventListener('message', one => { if (one.data.face) window.heard = one.data; })</script>"
@@ -342,12 +347,12 @@ def test_a_page_around_the_view_hears_which_face_is_clicked_and_where(chromium, 
             await tab.call("Input.dispatchMouseEvent", type=kind, x=450, y=400, button="left", clickCount=1)
         return await tab.until("window.heard")
 
-    heard = in_browser(chromium, tmp_path, work)
+    heard = in_browser(work)
     axis, side = "uvw".index(heard["face"][0]), float(heard["face"][1])
     assert volume.locate([heard["point"]])[0][axis] == pytest.approx(side, abs=0.02)
 
 
-def test_a_plane_of_space_cuts_the_body_in_its_colours(chromium, tmp_path):
+def test_a_plane_of_space_cuts_the_body_in_its_colours(in_browser, tmp_path):
     """u = x has one colour on a plane across x."""
     volume = benchmark_volume(2)
     file = written(tmp_path, scene_of(volume, solve.solve_problem(volume, solve.Poisson(exact="x"))))
@@ -357,14 +362,14 @@ def test_a_plane_of_space_cuts_the_body_in_its_colours(chromium, tmp_path):
         await tab.value(choice("x") + ", " + moved("at", 0.5))
         return (await tab.value(PARTS))["colors"]
 
-    seen = in_browser(chromium, tmp_path, work)
+    seen = in_browser(work)
     middle = np.rint(255 * np.array(colormaps[evaluate.MAP](128))[:3])
     near = {name: np.abs(np.array(name.split(","), dtype=float) - middle).max() < 6 for name in seen}
     assert sum(count for name, count in seen.items() if near[name]) > 0.9 * sum(seen.values()) > 1000
 
 
 @pytest.mark.slow
-def test_element_lines_are_those_of_the_solutions_mesh(chromium, tmp_path):
+def test_element_lines_are_those_of_the_solutions_mesh(in_browser, tmp_path):
     """A cube of 3 x 3 x 3 elements as seen along x: two dark lines cross a row, at a third and at two thirds."""
     volume = benchmark_volume(3, amplitude=0.0)
     scene = scene_of(volume, solve.solve_problem(volume, solve.Poisson(exact="x")))
@@ -383,7 +388,7 @@ def test_element_lines_are_those_of_the_solutions_mesh(chromium, tmp_path):
         await tab.value(typed("views", "+x") + ", document.getElementById('lined').click()")
         return await tab.value(row)
 
-    found = np.array(in_browser(chromium, tmp_path, work), dtype=float).reshape(-1, 4)
+    found = np.array(in_browser(work), dtype=float).reshape(-1, 4)
     body = np.flatnonzero(found[:, 3] == 255)
     light = found[body, :3].sum(axis=1)
     dark = (np.flatnonzero(light < 0.85 * np.median(light)) + 0.5) / len(body)
@@ -391,7 +396,7 @@ def test_element_lines_are_those_of_the_solutions_mesh(chromium, tmp_path):
     assert len(inner) >= 2 and np.abs(inner[:, None] - [1 / 3, 2 / 3]).min(axis=1).max() < 0.01
 
 
-def test_a_range_colours_what_lies_outside_by_its_ends(chromium, solved, tmp_path):
+def test_a_range_colours_what_lies_outside_by_its_ends(in_browser, solved):
     """u lies between 0 and 0.06."""
     table = np.rint(255 * colormaps[evaluate.MAP](np.arange(256))[:, :3])
 
@@ -414,7 +419,7 @@ def test_a_range_colours_what_lies_outside_by_its_ends(chromium, solved, tmp_pat
         ticks = await tab.value("[...document.querySelectorAll('.tick')].map(one => Number(one.textContent))")
         return seen, refused, first, low, ticks
 
-    seen, refused, first, low, ticks = in_browser(chromium, tmp_path, work)
+    seen, refused, first, low, ticks = in_browser(work)
     for name, end in (("above", 255), ("below", 0)):
         ends = ",".join(str(int(part)) for part in table[end])
         assert seen[name].get(ends, 0) > 0.9 * sum(seen[name].values())
@@ -432,7 +437,7 @@ def pulled():
     return bar, solve.solve_problem(bar, solve.Elasticity(exact=("x/100", "0", "0"), young=100.0, poisson_ratio=0.0))
 
 
-def test_a_body_opens_deformed_and_its_displacements_are_enlarged(chromium, pulled, tmp_path):
+def test_a_body_opens_deformed_and_its_displacements_are_enlarged(in_browser, pulled, tmp_path):
     """At most 0.04 of a diagonal of sqrt(18): 0.08 sqrt(18) / 0.04 is 8.49, rounded 8."""
     scene = scene_of(*pulled)
     assert scene["warp"] == 8.0 and scene["opening"]["field"] == "von Mises"
@@ -448,7 +453,7 @@ def test_a_body_opens_deformed_and_its_displacements_are_enlarged(chromium, pull
         await tab.value(clicked(0.5, 0.5))
         return words, widths, await tab.value(READ), tab.complaints
 
-    words, widths, read, complaints = in_browser(chromium, tmp_path, work)
+    words, widths, read, complaints = in_browser(work)
     assert complaints == [] and words == "displacements × 8"
     assert widths[8] / widths[0] == pytest.approx(1.08, abs=0.01)
     assert widths[16] / widths[0] == pytest.approx(1.16, abs=0.01)
@@ -457,7 +462,7 @@ def test_a_body_opens_deformed_and_its_displacements_are_enlarged(chromium, pull
     assert "everywhere" in read["von Mises stress"] and read["von Mises stress"].startswith("1 ")
 
 
-def test_frames_of_steps_in_time_and_of_modes_are_played(chromium, pulled, tmp_path):
+def test_frames_of_steps_in_time_and_of_modes_are_played(in_browser, pulled, tmp_path):
     bar, solution = pulled
     heat = [solve.solve_problem(bar, solve.Poisson(exact=f"{k}+x*0")) for k in (1, 2, 3)]
     stress = {"stress": lambda u, grad, x: 100 * grad[0, 0]}
@@ -484,12 +489,12 @@ def test_frames_of_steps_in_time_and_of_modes_are_played(chromium, pulled, tmp_p
         await tab.click("Pause")
         return seen, swinging, (await tab.value(PARTS))["box"], tab.complaints
 
-    seen, swinging, at_rest, complaints = in_browser(chromium, tmp_path, work)
+    seen, swinging, at_rest, complaints = in_browser(work)
     assert complaints == [] and seen == {"t = 0 s": "1", "t = 1 s": "2", "t = 2 s": "3"}
     assert swinging != at_rest
 
 
-def test_the_saved_picture_has_the_view_and_its_bar(chromium, pulled, tmp_path):
+def test_the_saved_picture_has_the_view_and_its_bar(in_browser, pulled, tmp_path):
     async def work(browser):
         tab = await opened(browser, written(tmp_path, scene_of(*pulled)))
         await tab.value(choice("u_x"))
@@ -499,7 +504,7 @@ def test_the_saved_picture_has_the_view_and_its_bar(chromium, pulled, tmp_path):
             "document.getElementById('view').clientHeight"
         )
 
-    (name, address), height = in_browser(chromium, tmp_path, work)
+    (name, address), height = in_browser(work)
     (tmp_path / name).write_bytes(base64.b64decode(address.removeprefix("data:image/png;base64,")))
     image = np.rint(255 * imread(tmp_path / name)[..., :3])
     table = np.rint(255 * colormaps[evaluate.MAP](np.arange(256))[:, :3])
@@ -508,7 +513,7 @@ def test_the_saved_picture_has_the_view_and_its_bar(chromium, pulled, tmp_path):
     assert np.all(image[2, 2] == 255)
 
 
-def test_controls_are_named(chromium, pulled, tmp_path):
+def test_controls_are_named(in_browser, pulled, tmp_path):
     """Every control has words that a screen reader says."""
     named = "one => one.labels?.[0]?.innerText.trim() || one.getAttribute('aria-label') || one.innerText.trim()"
 
@@ -516,7 +521,7 @@ def test_controls_are_named(chromium, pulled, tmp_path):
         tab = await opened(browser, written(tmp_path, scene_of(*pulled)))
         return await tab.value(f"[...document.querySelectorAll('#scene :is(input, button, select)')].map({named})")
 
-    found = in_browser(chromium, tmp_path, work)
+    found = in_browser(work)
     assert all(found) and len(found) > 20
 
 
@@ -536,7 +541,7 @@ def rod():
     return body, solve.solve_problem(body, solve.Poisson(exact="x"))
 
 
-def test_a_body_of_several_patches_is_one_view(chromium, rod, tmp_path):
+def test_a_body_of_several_patches_is_one_view(in_browser, rod, tmp_path):
     """Glued faces are not drawn; sections of space go through all patches, and values are read on each."""
     scene = scene_of(*rod)
     assert [tuple(place) for place in scene["outer"]].count((1, 0)) == 0 and len(scene["outer"]) == 14
@@ -560,7 +565,7 @@ def test_a_body_of_several_patches_is_one_view(chromium, rod, tmp_path):
         swatches = await tab.value("[...document.querySelectorAll('.swatch')].map((one) => one.innerText.trim())")
         return swatches, (await tab.value(PARTS))["box"], tab.complaints
 
-    swatches, box, complaints = in_browser(chromium, tmp_path, work)
+    swatches, box, complaints = in_browser(work)
     assert complaints == [] and swatches == ["p0", "p1", "p2"] and box[2] > box[0]
     for share, patch in ((0.2, "p0"), (0.5, "p1"), (0.8, "p2"), ("x 0.25", "p0"), ("x 0.75", "p2")):
         x = numbers(seen[share]["x, y, z"])[0]
@@ -569,7 +574,7 @@ def test_a_body_of_several_patches_is_one_view(chromium, rod, tmp_path):
     assert "Face p2_w1" in seen[0.8]
 
 
-def test_a_body_cut_open_shows_what_lies_behind(chromium, rod, tmp_path):
+def test_a_body_cut_open_shows_what_lies_behind(in_browser, rod, tmp_path):
     """With the octants in front left out, the middle of the picture is a section: it has no face."""
     scene = scene_of(*rod)
     assert scene["cut"]["planes"] and all(
@@ -582,7 +587,7 @@ def test_a_body_cut_open_shows_what_lies_behind(chromium, rod, tmp_path):
         await tab.value(choice("cut"))
         return whole, (await tab.value(PARTS))["colors"], tab.complaints
 
-    whole, cut, complaints = in_browser(chromium, tmp_path, work)
+    whole, cut, complaints = in_browser(work)
     assert complaints == [] and 0.3 * sum(whole.values()) < sum(cut.values()) < sum(whole.values())
 
 

@@ -49,7 +49,7 @@ class Tab:
     """An open page: what its console complained of, and the addresses it asked for."""
 
     def __init__(self, socket, session):
-        self._socket, self._session, self._count = socket, session, 0
+        self.socket, self._session, self._count = socket, session, 0
         self.complaints: list[str] = []
         self.asked: list[str] = []
 
@@ -59,9 +59,9 @@ class Tab:
         message = {"id": self._count, "method": method, "params": parameters}
         if self._session is not None:
             message["sessionId"] = self._session
-        await self._socket.send_json(message)
+        await self.socket.send_json(message)
         while True:
-            answer = await self._socket.receive_json(timeout=60)
+            answer = await self.socket.receive_json(timeout=60)
             if answer.get("id") == self._count and answer.get("sessionId") == self._session:
                 if "error" in answer:
                     raise (Moved if answer["error"].get("code") == MOVED else AssertionError)(answer)
@@ -135,16 +135,28 @@ class Tab:
 class Browser:
     """A running Chromium."""
 
-    def __init__(self, http, address):
-        self._http, self._address = http, address
+    def __init__(self, http, address, context=None):
+        self._http, self._address, self._context = http, address, context
+
+    async def _connected(self):
+        return Tab(await self._http.ws_connect(self._address, max_msg_size=0), None)
+
+    @asynccontextmanager
+    async def fresh(self):
+        """The same browser as a new one is: nothing is stored, no other tab is open; its tabs are closed at the end."""
+        tab = await self._connected()
+        context = await tab.call("Target.createBrowserContext")
+        try:
+            yield Browser(self._http, self._address, context)
+        finally:
+            await tab.call("Target.disposeBrowserContext", **context)
 
     async def open(self, url):
         """A new tab on that address."""
-        socket = await self._http.ws_connect(self._address, max_msg_size=0)
-        tab = Tab(socket, None)
-        target = (await tab.call("Target.createTarget", url="about:blank"))["targetId"]
+        tab = await self._connected()
+        target = (await tab.call("Target.createTarget", url="about:blank", **(self._context or {})))["targetId"]
         session = (await tab.call("Target.attachToTarget", targetId=target, flatten=True))["sessionId"]
-        tab = Tab(socket, session)
+        tab = Tab(tab.socket, session)
         for domain in ("Page", "Runtime", "Network", "Log", "DOM"):
             await tab.call(f"{domain}.enable")
         await tab.call("Page.navigate", url=url)
