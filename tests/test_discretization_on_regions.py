@@ -33,7 +33,7 @@ def test_the_matrix_is_symmetric_and_positive_on_any_region(text, problem):
         assert np.diag(matrix).reshape(system.right.shape) == pytest.approx(diagonal[:, *system.space.window])
 
 
-def test_the_block_of_a_component_has_the_diagonal_of_the_matrix():
+def test_the_block_of_a_component_has_the_diagonal_of_the_matrix(coarse_regions):
     system = discretize(QUADRATIC, Elasticity(exact=BODY, roller="x + y < 0.3 or nz > 0.5", fix="z < 0"))
     matrix = (system.operator @ np.eye(len(system.load))).diagonal().reshape(system.right.shape)
     blocks = [system.patches[0].matrix.block(i).diagonal()[system.space.window] for i in range(3)]
@@ -55,7 +55,7 @@ def test_rates_beside_those_of_whole_faces(degree):
     assert all(b.iterations <= 2.0 * max(a.iterations, 20) for a, b in zip(whole, cut, strict=True))
 
 
-def test_a_displacement_of_the_space_is_met_exactly_with_parts_of_components():
+def test_a_displacement_of_the_space_is_met_exactly_with_parts_of_components(coarse_regions):
     linear = ("0.1*x + 0.2*y", "0.3*z", "0.1*x - 0.1*z")
     for supports in (
         {"fix": "x < 0.7 and nz > 0.5"},
@@ -66,7 +66,7 @@ def test_a_displacement_of_the_space_is_met_exactly_with_parts_of_components():
         assert found.report.l2_relative < 1e-10, supports
 
 
-def test_a_law_of_ones_own_without_symmetry_is_held_on_a_region():
+def test_a_law_of_ones_own_without_symmetry_is_held_on_a_region(coarse_regions):
     class Wind(Form):
         symmetric = False
 
@@ -101,7 +101,7 @@ def test_a_pressure_acts_against_the_normal_and_a_spring_pulls_back():
     "supports",
     [{"fix": "u0"}, {"fix": "x < 0.31"}, {"fix": {"u0": (0, 0, 0), "nx > 0.5 and z > 0.4": (0, None, 0.01)}}],
 )
-def test_reactions_balance_what_acts_on_the_body(supports):
+def test_reactions_balance_what_acts_on_the_body(supports, coarse_regions):
     law = Elasticity(force=(0, 0, -1), load={"nz > 0.5 and x > 2": (0, "x", 0)}, young=100.0, **supports)
     found = solve_problem(BAR, law).report.balance
     assert found.load == pytest.approx((0.0, 6.0, -4.0), abs=1e-9)
@@ -109,7 +109,7 @@ def test_reactions_balance_what_acts_on_the_body(supports):
     assert found.imbalance < 1e-8
 
 
-def test_heat_that_comes_in_goes_out():
+def test_heat_that_comes_in_goes_out(coarse_regions):
     found = solve_problem(BAR, Poisson(value={"x < 0.3": 100.0}, exchange={"x > 1": (2.0, 20.0)}, kappa="10"))
     out, into = found.report.balance.reactions.values()
     assert out[0] == pytest.approx(-into[0], rel=1e-7) and out[0] > 0.0 and found.report.balance.imbalance < 1e-8
@@ -130,7 +130,7 @@ def test_heat_that_comes_in_goes_out():
         ({"fix": "u0", "spring": {"x > 3": -1.0}}, "must be zero or positive"),
     ],
 )
-def test_what_cannot_hold_a_body_is_refused_in_one_line(given, says):
+def test_what_cannot_hold_a_body_is_refused_in_one_line(given, says, coarse_regions):
     with pytest.raises(ValueError, match=says) as caught:
         solve_problem(BAR, Elasticity(**given))
     assert "\n" not in str(caught.value)
@@ -148,7 +148,7 @@ def test_tiny_regions_stay_coercive_or_are_refused():
         assert np.linalg.eigvalsh(matrix)[0] > 0.0
 
 
-def test_regions_of_a_left_handed_volume_give_the_same_solution():
+def test_regions_of_a_left_handed_volume_give_the_same_solution(coarse_regions):
     turned = BSplineVolume(BAR.degrees, BAR.knots, BAR.control_points[::-1])
     law = Elasticity(fix="x < 0.7", load={"nx > 0.5": (0, 0, 1)}, pressure={"nz > 0.5 and x > 2": 0.5})
     one, other = solve_problem(BAR, law), solve_problem(turned, law)
@@ -163,7 +163,7 @@ def test_few_iterations_where_all_of_a_curved_boundary_is_a_region():
     assert weak.iterations <= 2 * strong.iterations and weak.l2 == pytest.approx(strong.l2, rel=0.1)
 
 
-def test_scaled_regions_mean_the_same_in_other_units():
+def test_scaled_regions_mean_the_same_in_other_units(coarse_regions):
     large = BAR.transformed(1000.0, np.array([5.0, 6.0, 7.0]))
     one, other = (
         solve_problem(volume, Poisson(value={"X < -0.7 and Z < 0.1": 1.0}, exchange={"nx > 0.5": (alpha, 0.0)}))
