@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import asyncio
 import functools
 import inspect
 import os
 import shutil
 import signal
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
@@ -228,3 +229,19 @@ def chromium() -> str:
     if found is None:
         pytest.skip("no chromium on this machine; remedy: apt-get install --no-install-recommends chromium")
     return found
+
+
+@pytest.fixture(scope="module")
+def in_browser(chromium: str, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[[Any], Any]]:
+    """A function that returns what a coroutine of a browser returns; one Chromium is as new for each."""
+    from browser import running
+
+    async def alone(browser: Any, work: Any) -> Any:
+        async with browser.fresh() as one:
+            return await work(one)
+
+    with asyncio.Runner() as runner:
+        started = running(chromium, tmp_path_factory.mktemp("browser"))
+        browser = runner.run(started.__aenter__())
+        yield lambda work: runner.run(alone(browser, work))
+        runner.run(started.__aexit__(None, None, None))

@@ -18,7 +18,6 @@ from urllib.parse import quote
 
 import numpy as np
 import pytest
-from browser import running
 from matplotlib.colors import rgb_to_hsv, to_rgb
 from mesh_files import CUBE, TRIANGLES, obj
 from shapes import ball
@@ -126,32 +125,31 @@ SHOWN = """[document.querySelector("h2").innerText,
 REPORT = "document.querySelector('iframe')?.contentDocument?.body?.innerText"
 
 
-def test_from_a_dropped_file_to_the_downloaded_volume(chromium, page, tmp_path, capsys):
-    asyncio.run(walk(chromium, page, tmp_path, capsys))
+def test_from_a_dropped_file_to_the_downloaded_volume(in_browser, page, tmp_path, capsys):
+    in_browser(lambda browser: walk(browser, page, tmp_path, capsys))
 
 
-async def walk(chromium, port, folder, capsys):
-    async with running(chromium, folder) as browser:
-        first = await browser.open(f"http://127.0.0.1:{port}/")
-        await refused(first, folder, capsys)
-        await dropped_and_started(first, folder)
-        second = await browser.open(f"http://127.0.0.1:{port}/")
-        await seen_by_another_tab(second, folder)
-        await trained(first, folder)
-        await finished(first, folder)
-        assert ask(port, "GET", "/files/3/report.json")[0] == 200
-        assert ask(port, "GET", "/files/%D9%A3/report.json")[0] == 404  # an Arabic three
-        await another_problem(first)
-        await stopped(second)
-        await kept(first)
-        await deleted(first, second)
-        for tab in (first, second):
-            await asyncio.sleep(0.5)
-            await tab.text()  # whatever it has to say by now
-            assert tab.complaints == []
-            assert tab.asked
-            own = (f"http://127.0.0.1:{port}/", f"ws://127.0.0.1:{port}/", "data:", "blob:")
-            assert [address[:80] for address in tab.asked if not address.startswith(own)] == []
+async def walk(browser, port, folder, capsys):
+    first = await browser.open(f"http://127.0.0.1:{port}/")
+    await refused(first, folder, capsys)
+    await dropped_and_started(first, folder)
+    second = await browser.open(f"http://127.0.0.1:{port}/")
+    await seen_by_another_tab(second, folder)
+    await trained(first, folder)
+    await finished(first, folder)
+    assert ask(port, "GET", "/files/3/report.json")[0] == 200
+    assert ask(port, "GET", "/files/%D9%A3/report.json")[0] == 404  # an Arabic three
+    await another_problem(first)
+    await stopped(second)
+    await kept(first)
+    await deleted(first, second)
+    for tab in (first, second):
+        await asyncio.sleep(0.5)
+        await tab.text()  # whatever it has to say by now
+        assert tab.complaints == []
+        assert tab.asked
+        own = (f"http://127.0.0.1:{port}/", f"ws://127.0.0.1:{port}/", "data:", "blob:")
+        assert [address[:80] for address in tab.asked if not address.startswith(own)] == []
 
 
 async def refused(tab, folder, capsys):
@@ -277,23 +275,22 @@ async def stopped(tab):
     await tab.sees("Resume continues where it was stopped", PATIENCE)
 
 
-def test_what_is_read_stays_when_the_program_ends(chromium, tmp_path):
-    asyncio.run(read_on(chromium, tmp_path))
+def test_what_is_read_stays_when_the_program_ends(in_browser, tmp_path):
+    in_browser(lambda browser: read_on(browser, tmp_path))
 
 
-async def read_on(chromium, folder):
+async def read_on(browser, folder):
     """The page is neither drawn anew nor emptied: a frame in it would be loaded again, from nowhere."""
-    async with running(chromium, folder) as browser:
-        with served(folder) as (port, server):
-            tab = await browser.open(f"http://127.0.0.1:{port}/")
-            await tab.click("cube")
-            await tab.sees("1,538 vertices, 3,072 faces", PATIENCE)
-            await tab.value("document.querySelector('h2').marked = 'the same'")
-            server.terminate()
-            await tab.sees("The page's program has ended")
-        assert await tab.value("document.querySelector('h2').marked") == "the same"
-        text = await tab.text()
-        assert "1,538 vertices, 3,072 faces" in text and "Start\n" not in text and "Drop a surface" not in text
+    with served(folder) as (port, server):
+        tab = await browser.open(f"http://127.0.0.1:{port}/")
+        await tab.click("cube")
+        await tab.sees("1,538 vertices, 3,072 faces", PATIENCE)
+        await tab.value("document.querySelector('h2').marked = 'the same'")
+        server.terminate()
+        await tab.sees("The page's program has ended")
+    assert await tab.value("document.querySelector('h2').marked") == "the same"
+    text = await tab.text()
+    assert "1,538 vertices, 3,072 faces" in text and "Start\n" not in text and "Drop a surface" not in text
 
 
 LISTS = "[...document.querySelectorAll('form .poisson textarea')].map((one) => one.value)"
@@ -301,27 +298,26 @@ PICKED = "document.querySelector('.picked')?.innerText"
 BOX = [1.0, 2.0, 3.0]
 
 
-def test_a_click_on_the_part_names_its_face(chromium, page, tmp_path):
-    asyncio.run(pick(chromium, page, tmp_path))
+def test_a_click_on_the_part_names_its_face(in_browser, page, tmp_path):
+    in_browser(lambda browser: pick(browser, page, tmp_path))
 
 
-async def pick(chromium, port, folder):
+async def pick(browser, port, folder):
     """At a screen's and at a phone's width."""
-    async with running(chromium, folder) as browser:
-        tab = await with_box(browser, port, folder / "box.obj")
-        first = await clicked_face(tab, folder, 1280, (0.06, 0.06))
-        assert await tab.value(LISTS) == [f"{first}=", "", ""]
-        await tab.value("document.querySelector('form [name=flux]').focus()")
-        second = await clicked_face(tab, folder, 400, (-0.18, 0.04))
-        assert second != first and await tab.value("document.documentElement.scrollWidth") <= 400
-        assert await tab.value(LISTS) == [f"{first}=", f"{second}=", ""]
-        await drag(tab)
-        assert (await tab.value(PICKED)).startswith(second)
-        assert tab.complaints == []
-        await tab.value(TYPED % ("kappa", "x*"))
-        await tab.click("Start")
-        await tab.until("document.querySelector('form [role=alert]').innerText.includes('kappa')")
-        assert "Start\n" in await tab.text()  # it has not begun
+    tab = await with_box(browser, port, folder / "box.obj")
+    first = await clicked_face(tab, folder, 1280, (0.06, 0.06))
+    assert await tab.value(LISTS) == [f"{first}=", "", ""]
+    await tab.value("document.querySelector('form [name=flux]').focus()")
+    second = await clicked_face(tab, folder, 400, (-0.18, 0.04))
+    assert second != first and await tab.value("document.documentElement.scrollWidth") <= 400
+    assert await tab.value(LISTS) == [f"{first}=", f"{second}=", ""]
+    await drag(tab)
+    assert (await tab.value(PICKED)).startswith(second)
+    assert tab.complaints == []
+    await tab.value(TYPED % ("kappa", "x*"))
+    await tab.click("Start")
+    await tab.until("document.querySelector('form [role=alert]').innerText.includes('kappa')")
+    assert "Start\n" in await tab.text()  # it has not begun
 
 
 async def with_box(browser, port, path):
@@ -337,47 +333,46 @@ async def with_box(browser, port, path):
 
 
 @pytest.mark.slow
-def test_an_elastic_body_is_held_and_loaded_by_clicks(chromium, page, tmp_path):
-    asyncio.run(bend(chromium, page, tmp_path))
+def test_an_elastic_body_is_held_and_loaded_by_clicks(in_browser, page, tmp_path):
+    in_browser(lambda browser: bend(browser, page, tmp_path))
 
 
 LEVEL = """(async () => (await (await fetch(
   document.querySelector('a[download="report.json"]').href)).json()).elasticity.levels[0])()"""
 
 
-async def bend(chromium, port, folder):
+async def bend(browser, port, folder):
     """The force on the face that is loaded is answered by the one that is held, also where it is solved again."""
-    async with running(chromium, folder) as browser:
-        tab = await with_box(browser, port, folder / "body.obj")
-        await tab.value("document.querySelector('form [value=elasticity]').click()")
-        held = await clicked_face(tab, folder, 1280, (0.06, 0.06))
-        await tab.value("document.querySelector('form [name=load]').focus()")
-        pushed = await clicked_face(tab, folder, 400, (-0.18, 0.04))
-        await tab.until(f"document.querySelector('form [name=load]').value === '{pushed}=0;0;0'")
-        area = float((await tab.value(PICKED)).split("area ")[1].split(",")[0])
-        await tab.until("document.activeElement.name === 'load'")
-        await tab.call("Input.insertText", text="0;0;-2")
-        assert await tab.value("document.querySelector('form [name=load]').value") == f"{pushed}=0;0;-2"
-        assert await tab.value("document.documentElement.scrollWidth") <= 400
-        await tab.picture(folder / "body 400.png", width=400)
-        await tab.picture(folder / "body 1280.png", width=1280)
-        assert await tab.value("document.documentElement.scrollWidth") <= 1280
-        await tab.click("Start")
-        await tab.until(f"{REPORT}?.includes('iga-nn run elasticity')", PATIENCE)
-        assert "linear elasticity" in await tab.value(REPORT) and held in await tab.value(REPORT)
-        first = await tab.value(LEVEL)
-        # The small map bulges: its face is some 3 % larger than the part's.
-        np.testing.assert_allclose(first["load"], [0.0, 0.0, -2.0 * area], rtol=5e-2, atol=1e-3)
-        np.testing.assert_allclose(first["reactions"][f"fix '{held}'"], -np.array(first["load"]), atol=1e-6)
-        await tab.value("document.querySelector('.problem').open = true")
-        await tab.value(TYPED % ("young", "2"))
-        await tab.click("Solve")
-        await tab.until(f"{REPORT}?.includes('iga-nn solve elasticity')", PATIENCE)
-        again = await tab.value(LEVEL)
-        ratio = again["extremes"]["magnitude"]["largest"] / first["extremes"]["magnitude"]["largest"]
-        assert ratio == pytest.approx(0.5)
-        await tab.picture(folder / "bent.png", width=1280)
-        assert tab.complaints == []
+    tab = await with_box(browser, port, folder / "body.obj")
+    await tab.value("document.querySelector('form [value=elasticity]').click()")
+    held = await clicked_face(tab, folder, 1280, (0.06, 0.06))
+    await tab.value("document.querySelector('form [name=load]').focus()")
+    pushed = await clicked_face(tab, folder, 400, (-0.18, 0.04))
+    await tab.until(f"document.querySelector('form [name=load]').value === '{pushed}=0;0;0'")
+    area = float((await tab.value(PICKED)).split("area ")[1].split(",")[0])
+    await tab.until("document.activeElement.name === 'load'")
+    await tab.call("Input.insertText", text="0;0;-2")
+    assert await tab.value("document.querySelector('form [name=load]').value") == f"{pushed}=0;0;-2"
+    assert await tab.value("document.documentElement.scrollWidth") <= 400
+    await tab.picture(folder / "body 400.png", width=400)
+    await tab.picture(folder / "body 1280.png", width=1280)
+    assert await tab.value("document.documentElement.scrollWidth") <= 1280
+    await tab.click("Start")
+    await tab.until(f"{REPORT}?.includes('iga-nn run elasticity')", PATIENCE)
+    assert "linear elasticity" in await tab.value(REPORT) and held in await tab.value(REPORT)
+    first = await tab.value(LEVEL)
+    # The small map bulges: its face is some 3 % larger than the part's.
+    np.testing.assert_allclose(first["load"], [0.0, 0.0, -2.0 * area], rtol=5e-2, atol=1e-3)
+    np.testing.assert_allclose(first["reactions"][f"fix '{held}'"], -np.array(first["load"]), atol=1e-6)
+    await tab.value("document.querySelector('.problem').open = true")
+    await tab.value(TYPED % ("young", "2"))
+    await tab.click("Solve")
+    await tab.until(f"{REPORT}?.includes('iga-nn solve elasticity')", PATIENCE)
+    again = await tab.value(LEVEL)
+    ratio = again["extremes"]["magnitude"]["largest"] / first["extremes"]["magnitude"]["largest"]
+    assert ratio == pytest.approx(0.5)
+    await tab.picture(folder / "bent.png", width=1280)
+    assert tab.complaints == []
 
 
 async def clicked_face(tab, folder, width, place):

@@ -8,7 +8,6 @@ import json
 
 import numpy as np
 import pytest
-from browser import running
 from matplotlib import colormaps
 from matplotlib.image import imread
 
@@ -83,21 +82,6 @@ def written(tmp_path, scene):
 
 def numbers(text):
     return np.array([float(part) for part in text.split(",")])
-
-
-@pytest.fixture(scope="module")
-def in_browser(chromium, tmp_path_factory):
-    """A function that returns what a coroutine of a browser returns; one Chromium is as new for each."""
-
-    async def alone(browser, work):
-        async with browser.fresh() as one:
-            return await work(one)
-
-    with asyncio.Runner() as runner:
-        started = running(chromium, tmp_path_factory.mktemp("browser"))
-        browser = runner.run(started.__aenter__())
-        yield lambda work: runner.run(alone(browser, work))
-        runner.run(started.__aexit__(None, None, None))
 
 
 async def opened(browser, file, width=1000, before=""):
