@@ -3,6 +3,7 @@ from __future__ import annotations
 import base64
 import json
 import re
+from functools import cache
 
 import numpy as np
 import pytest
@@ -56,9 +57,20 @@ def test_units_stand_behind_lengths_and_stresses(in_folder, capsys):
     assert "--unit mm" in command and "--stress-unit 'N/mm<2>'" in command
 
 
+@pytest.fixture(scope="module")
+def seen(chromium, result, tmp_path_factory):
+    """A function that opens the page in a new browser, coloured by what the address chooses, once for each width."""
+
+    @cache
+    def opened(what, width):
+        return browse(chromium, tmp_path_factory.mktemp(what), f"{(result / 'report.html').as_uri()}#{what}", width)
+
+    return opened
+
+
 @pytest.mark.parametrize("width", [1280, 400])
-def test_browser_draws_the_scene_and_fetches_nothing(chromium, result, tmp_path, width):
-    image, console, asked = browse(chromium, tmp_path, (result / "report.html").as_uri() + "#faces", width)
+def test_browser_draws_the_scene_and_fetches_nothing(seen, width):
+    image, console, asked = seen("faces", width)
     assert console == "" and asked == []
     hues = drawn(image)[:, 0]
     wanted = rgb_to_hsv(np.array([to_rgb(color) for color in FACE_COLORS]))[:, 0]
@@ -66,9 +78,8 @@ def test_browser_draws_the_scene_and_fetches_nothing(chromium, result, tmp_path,
     assert sum(count > 1000 for count in seen) >= 3  # three faces of a twisted cube
 
 
-def test_address_chooses_what_is_coloured(chromium, result, tmp_path):
-    faces, *_ = browse(chromium, tmp_path, (result / "report.html").as_uri() + "#faces", 700)
-    error, console, _ = browse(chromium, tmp_path, (result / "report.html").as_uri() + "#error", 700)
+def test_address_chooses_what_is_coloured(seen):
+    faces, (error, console, _) = seen("faces", 400)[0], seen("error", 400)
     assert console == "" and len(drawn(error)) > 5000
     assert np.mean(np.abs(faces - error).max(axis=-1) > 0.1) > 0.05
 
