@@ -246,15 +246,19 @@ def last_value(source, space):
     return eval(compile(ast.Expression(last.value), "notebook", "eval"), space)
 
 
-def test_convergence_rates(tmp_path, capsys):
-    studies = load("convergence").main(["--out", str(tmp_path), "--degrees", "2", "3", "--levels", "3"])
+def test_convergence_rates(tmp_path, capsys, monkeypatch):
+    """Without degree 6, for which kernels would be compiled that no other test needs."""
+    script = load("convergence")
+    raised = script.raise_degree
+    monkeypatch.setattr(script, "raise_degree", lambda degrees: raised(degrees[:-1]))
+    studies = script.main(["--out", str(tmp_path), "--degrees", "2", "3", "--levels", "3"])
     for degree, rows in studies["h"].items():
         assert degree + 0.9 < rows[-1].rate_l2 < degree + 1.3
         assert degree - 0.1 < rows[-1].rate_h1 < degree + 0.3
     p, k = (studies[name] for name in studies if "refinement" in name)
     assert p[3][0].report.l2 == pytest.approx(k[3][0].report.l2)  # where both start: one space
-    assert [rows[0].report.dofs for rows in k.values()] == [7**3, 8**3, 9**3, 10**3]  # C^(degree - 1) on 4^3 elements
-    assert [rows[0].report.dofs for rows in p.values()] == [7**3, 11**3, 15**3, 19**3]  # C^2: a knot more each
+    assert [rows[0].report.dofs for rows in k.values()] == [7**3, 8**3, 9**3]  # C^(degree - 1) on 4^3 elements
+    assert [rows[0].report.dofs for rows in p.values()] == [7**3, 11**3, 15**3]  # C^2: a knot more each
     for study in (p, k):
         errors = [rows[0].report.l2 for rows in study.values()]
         assert all(b < a / 5 for a, b in pairwise(errors))
