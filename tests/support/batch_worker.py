@@ -27,7 +27,7 @@ def followed_run(run, name, folder, progress, **given):
     if mesh.stem == "hungry":
         taken = []
         while True:
-            taken += [bytearray(b"x" * (16 << 20))] * (len(taken) < 150)  # more than the limit, less than all there is
+            taken += [b"x" * (16 << 20)] * (len(taken) < 150)  # more than the limit, less than all there is
             time.sleep(0.02)
     steps = []
 
