@@ -1,14 +1,14 @@
 """The whole way on a small surface, with options that take about a second."""
 
-import logging
 from dataclasses import replace
+from unittest import TestCase
 
 import numpy as np
 import pytest
 import torch
 from block_starts import torus
 from shapes import turned
-from small_run import STEPS, small_surface, tiny_config
+from small_run import FEW, STEPS, small_surface, tiny_config
 
 from parameterize.certificate.body import certify
 from parameterize.checkpoint import CheckpointError
@@ -19,12 +19,19 @@ from parameterize.cube.cube import CORNERS
 from parameterize.cube.cutting import subdivide_finely
 from parameterize.optimization.phases import FIRM_ROUNDS
 from parameterize.run import corner_vertices, parameterize
+from parameterize.spline.sampled_boundary import SampledBoundary
 from parameterize.starts.start import MOST_POINTS
 from parameterize.surface.surface import surface_from_arrays
 from parameterize.training.backend import choose_device, choose_precision
 from parameterize.training.trainer import start_map
 
-pytestmark = pytest.mark.usefixtures("few_distances")
+
+@pytest.fixture(scope="module", autouse=True)
+def few_distances():
+    """For the fixtures of this file, too."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(SampledBoundary.of.__func__, "__defaults__", FEW)
+        yield
 
 
 @pytest.fixture(scope="module")
@@ -206,17 +213,25 @@ def hard_config(starts=2, easy_loss=1e-9):
     return replace(config, starts=starts, train=replace(config.train, easy_loss=easy_loss))
 
 
-@pytest.fixture
-def few_shares(monkeypatch):
+@pytest.fixture(scope="module")
+def few_shares():
     """Two rounds in which F grows."""
-    monkeypatch.setattr("parameterize.starts.growth.SHARES", (0.1, 1.0))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("parameterize.starts.growth.SHARES", (0.1, 1.0))
+        yield
 
 
-@pytest.mark.usefixtures("few_shares")
-def test_a_shape_that_is_hard_to_train_is_grown_after_the_first_stage(surface, undisturbed, caplog):
-    with caplog.at_level(logging.INFO, "parameterize"):
+@pytest.fixture(scope="module")
+def grown(surface, few_shares):
+    """The map of a surface that counts as hard to train, and what was told on the way."""
+    with TestCase().assertLogs("parameterize", "INFO") as told:
         result = parameterize(surface, hard_config(), seed=3, device="cpu")
-    assert "network: hard for the network; growing a map from a cube instead" in caplog.text
+    return result, told.output
+
+
+def test_a_shape_that_is_hard_to_train_is_grown_after_the_first_stage(surface, undisturbed, grown):
+    result, told = grown
+    assert any("network: hard for the network; growing a map from a cube instead" in line for line in told)
     stages = result.history["stage"]
     assert [(stages == stage.name).sum() for stage in tiny_config().stages] == [STEPS[0], 0, 0, 0, 0]
     assert not np.array_equal(result.volume.control_points, undisturbed.volume.control_points)
@@ -248,14 +263,20 @@ def test_a_shape_is_judged_without_its_distortion(surface, undisturbed):
     first = undisturbed.history["stage"] == "S(2)"
     columns = [undisturbed.history[name][first] for name in ("folded", "loss", "arap")]
     _, loss, arap = min(zip(*columns, strict=True))
-    for limit, trained in ((loss - 0.9 * arap, True), (loss - 1.1 * arap, False)):
-        config = hard_config(starts=2)
-        config = replace(config, train=replace(config.train, easy_loss=limit))
-        assert ("S(1)" in parameterize(surface, config, seed=3, device="cpu").history["stage"]) == trained
+    seen = []
+
+    def interrupt(state):
+        if state.stage != "S(2)":
+            seen.append(state.stage)
+            raise KeyboardInterrupt
+
+    for limit in (loss - 0.9 * arap, loss - 1.1 * arap):
+        with pytest.raises(KeyboardInterrupt):
+            parameterize(surface, hard_config(easy_loss=limit), seed=3, device="cpu", progress=interrupt)
+    assert seen == ["S(1)", "layout"]  # trained on, and grown
 
 
-@pytest.mark.usefixtures("few_shares")
-def test_a_run_killed_after_the_look_at_a_hard_shape_resumes(surface, tmp_path):
+def test_a_run_killed_after_the_look_at_a_hard_shape_resumes(surface, grown, tmp_path):
     def interrupt(state):
         if state.stage == "spline":
             raise KeyboardInterrupt
@@ -263,8 +284,7 @@ def test_a_run_killed_after_the_look_at_a_hard_shape_resumes(surface, tmp_path):
     options = {"seed": 3, "device": "cpu", "checkpoint_dir": tmp_path}
     with pytest.raises(KeyboardInterrupt):
         parameterize(surface, hard_config(), progress=interrupt, **options)
-    whole = parameterize(surface, hard_config(), seed=3, device="cpu")
-    same_result(whole, parameterize(surface, hard_config(), resume=True, **options))
+    same_result(grown[0], parameterize(surface, hard_config(), resume=True, **options))
 
 
 def test_given_corners_are_honoured(surface):
