@@ -162,6 +162,8 @@ def short_training(
 
     full = iga_nn.parameterize  # loaded before it is replaced: else what replaces it would be put back
     defaults = {name: one.default for name, one in list(inspect.signature(full).parameters.items())[2:]}
+    for name, kept in found_once().items():
+        monkeypatch.setattr(name, kept)
 
     @functools.wraps(full)
     def parameterize(surface: Any, config: Any = None, when_made: Any = None, **options: Any) -> Any:
@@ -169,7 +171,9 @@ def short_training(
         short = short.with_control_points(min(8, short.spline.control_points))
         changes_nothing = ("progress", "when_made", "checkpoint_dir")
         given = {name: str(value) for name, value in (defaults | options).items() if name not in changes_nothing}
-        asked = (surface.name, surface.sha256, short, *sorted(given.items()))
+        body = (surface.vertices.tobytes(), surface.faces.tobytes(), surface.sharp)  # also from another file
+        groups = [(name, faces.tobytes()) for name, faces in surface.groups.items()]
+        asked = (*body, *groups, short, *sorted(given.items()))
         if asked not in trained:
             trained[asked] = full(surface, short, **options)
         return told(trained[asked], when_made)
