@@ -118,6 +118,11 @@ TYPED = """(() => {
   field.value = "%s";
   field.dispatchEvent(new Event("input", {bubbles: true}));
 })()"""
+BY_FACES = """(() => {
+  const report = document.querySelector("iframe").contentDocument;
+  report.querySelector("input[name=field][value=faces]").click();
+  report.getElementById("stage").scrollIntoView();
+})()"""
 RELOADED = "window.reloaded = false; location.reload()"
 SHOWN = """[document.querySelector("h2").innerText,
   [...document.querySelectorAll("form .poisson .field input")].map((one) => one.value),
@@ -213,7 +218,9 @@ async def finished(tab, folder):
     assert re.search("iga-nn run poisson 'my ball.obj'.* --reaction 0", text)
     (folder / "volume.npz").write_bytes(base64.b64decode(await tab.value(FETCHED)))
     assert load_volume(folder / "volume.npz").shape == (6, 6, 6)
+    await tab.value(BY_FACES)
     await shows_faces(tab, folder / "done.png")
+    await tab.value("window.scrollTo(0, 0)")
 
 
 async def another_problem(tab):
