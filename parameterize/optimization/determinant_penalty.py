@@ -145,10 +145,11 @@ class BlockDeterminants:
             add_products(nets[0][component], crosses[0][component], 1.0, determinant)
         unscaled = self._unscale[..., None] / spans.volumes
         short = np.moveaxis(spans.floors - determinant * unscaled, -1, 0)
-        place = np.argwhere(short > 0.0)  # (r, 4): span and coefficient, span by span
+        unscaled = np.ascontiguousarray(np.moveaxis(unscaled, -1, 0))
+        place = np.ascontiguousarray(np.argwhere(short > 0.0))  # (r, 4): span and coefficient, span by span
         rows = np.zeros((len(place), *np.roll(bezier.shape, 1)[1:]), dtype=dtype)
         for direction, (cross, scale) in enumerate(zip(crosses, self._scales, strict=True)):
-            _add_derivatives(place, cross, scale, np.moveaxis(unscaled, -1, 0), direction, rows)
+            _add_derivatives(place, cross, scale, unscaled, direction, rows)
         counts = np.bincount(place[:, 0], minlength=len(spans.first))
         starts = np.concatenate([[0], np.cumsum(counts[counts > 0])])
         shares = spans.shares[place[:, 0]].astype(dtype)

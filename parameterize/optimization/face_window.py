@@ -25,7 +25,8 @@ def polynomials_of(nets: Nets) -> Polynomials:
     begins = [breakpoints(row)[:-1] for row in knots]
     found = [basis_derivatives(row, degree, begin, degree) for row, begin in zip(knots, begins, strict=True)]
     factorials = np.cumprod(np.maximum(np.arange(degree + 1), 1))
-    coefficients = np.concatenate([derivatives.swapaxes(0, 1) for _, derivatives in found]) / factorials[:, None]
+    taylor = np.concatenate([derivatives.swapaxes(0, 1) for _, derivatives in found]) / factorials[:, None]
+    coefficients = np.ascontiguousarray(taylor)
     starts = np.cumsum([0, *(len(begin) for begin in begins)])
     return starts, np.concatenate(begins), np.concatenate([first for first, _ in found]), coefficients, nets.starts
 
@@ -55,7 +56,7 @@ class FaceWindow:
 
     def derivatives(self, control: Array) -> tuple[Array, Array, Array]:
         """Return F and its tangents t_a and t_b at the points, (N, 3) each."""
-        flat, windows = control.reshape(3, -1), (self.indices, self.in_a, self.in_b)
+        flat, windows = np.ascontiguousarray(control.reshape(3, -1)), (self.indices, self.in_a, self.in_b)
         found = in_parallel(lambda piece: _tangents(*(w[piece] for w in windows), flat), pieces(len(self.indices)))
         value, along_a, along_b = np.concatenate(found).swapaxes(0, 1)
         return value, along_a, along_b

@@ -116,7 +116,7 @@ class SlidingParameters:
         Points whose distance would grow, and points farther away than `reach`, keep their parameters. With
         `keep_layout`, steps that would flip a triangle are shortened.
         """
-        window, field = self.window, control.reshape(3, -1)
+        window, field = self.window, np.ascontiguousarray(control.reshape(3, -1))
         polynomials, before = self._polynomials, (self.parameters, self.cube_faces)
         longest = np.array([0.5 / max(shape) for shape in self.nets.shapes])
         edges = next_faces(self.nets), self.boxes

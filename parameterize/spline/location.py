@@ -128,7 +128,7 @@ def bezier_nets(volume: BSplineVolume) -> Array:
 
 def _coefficients(volume: BSplineVolume) -> Array:
     """Return the control points (n_u, n_v, n_w, 3), of a rational volume homogeneous, (.., 4)."""
-    return volume.control_points if volume.weights is None else volume.homogeneous
+    return np.ascontiguousarray(volume.control_points if volume.weights is None else volume.homogeneous)
 
 
 def _padded(knots: Knots) -> Array:
