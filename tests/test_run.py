@@ -1,6 +1,7 @@
 """The whole way on a small surface, with options that take about a second."""
 
 from dataclasses import replace
+from typing import get_args
 from unittest import TestCase
 
 import numpy as np
@@ -12,7 +13,7 @@ from small_run import FEW, STEPS, small_surface, tiny_config
 
 from parameterize.certificate.body import certify
 from parameterize.checkpoint import CheckpointError
-from parameterize.config import NetworkConfig
+from parameterize.config import NetworkConfig, StageConfig, StageName
 from parameterize.cube import boundary_map, edge_paths
 from parameterize.cube.boundary_map import BoundaryMap
 from parameterize.cube.cube import CORNERS
@@ -292,12 +293,12 @@ def test_given_corners_are_honoured(surface):
     rolled = points[[0, 2, 4, 6, 1, 3, 5, 7]]  # (u, v, w) -> (v, w, u): a third of a turn about the diagonal
     chosen = corner_vertices(surface, rolled)
     config = tiny_config()
-    steps = (100, 50, 100, 30, 60)
+    steps = (100, 50, 100)  # the stages that hold the corners and edges are added
     config = replace(
         config,
         network=NetworkConfig(width=32, modules=2, frequencies=4),
         train=replace(config.train, learning_rate=3e-3),
-        stages=tuple(replace(stage, steps=n) for stage, n in zip(config.stages, steps, strict=True)),
+        stages=tuple(map(StageConfig, get_args(StageName), steps)),
         spline=replace(config.spline, rounds=1),
     )
     result = parameterize(surface, config, device="cpu", corners=rolled)

@@ -62,9 +62,10 @@ def tapered_stack_of(vertices: Array, faces: IntArray, sharp: float = SHARP) -> 
 def _slabs(points: Array, faces: IntArray, near: float) -> list[_Slab] | None:
     """Return the slabs between the heights of corners; None for too many of them, and for sides that close to a tip."""
     order = np.sort(points[:, 2])
-    heights = [float(row.mean()) for row in np.split(order, np.flatnonzero(np.diff(order) > near) + 1)]
-    if len(heights) > _MOST_HEIGHTS:
+    parts = np.flatnonzero(np.diff(order) > near) + 1
+    if len(parts) >= _MOST_HEIGHTS:
         return None
+    heights = [float(row.mean()) for row in np.split(order, parts)]
     slabs: list[_Slab] = []
     for low, high in zip(heights, heights[1:], strict=False):
         slab = _Slab(low, high, tuple(_ruled(points, faces, low, high, near)))

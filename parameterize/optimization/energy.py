@@ -29,7 +29,6 @@ from .tensor_product import FastDiagonalization
 from .term import RoundWeights, Term, Weights
 
 _REACH = 0.03  # while F grows, surface points farther from F than this do not slide, and draw F in all directions
-_SLIDES = 3  # of the boundary parameters after each step: further ones hardly move them
 _RELAXATIONS = 1  # sweeps over the triangles that these flipped: after every step, so that flips do not pile up
 _PULL = 3e-4  # share of the surface's weight in the preconditioner: more would hold back slides along the surface
 _TOLERANCE, _ITERATIONS = 0.1, 20  # of a Newton direction, relative and at most: a better one does not save steps
@@ -140,8 +139,7 @@ class SplineEnergy:
         if self._grows:
             places.slide(control, points, keep_layout=True, reach=_REACH)
         else:
-            for _ in range(_SLIDES):
-                places.slide(control, points)
+            places.slide(control, points)
             places.relax(_RELAXATIONS)
         self.watch_facing(control)
         if self._contact is not None:

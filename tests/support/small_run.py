@@ -2,11 +2,12 @@
 
 from dataclasses import replace
 from pathlib import Path
+from typing import get_args
 
 import numpy as np
 from shapes import rounded_cube, turned
 
-from parameterize.config import NetworkConfig, preset
+from parameterize.config import NetworkConfig, StageConfig, StageName, preset
 from parameterize.surface.surface import surface_from_arrays
 
 BATCH_WORKER = Path(__file__).with_name("batch_worker.py")
@@ -21,7 +22,7 @@ def shortened(config):
         starts=1,
         network=NetworkConfig(width=16, modules=1, frequencies=3),
         train=replace(config.train, cell=0.2, triangles=200, easy_loss=None),
-        stages=tuple(replace(stage, steps=n) for stage, n in zip(config.stages, STEPS, strict=True)),
+        stages=tuple(map(StageConfig, get_args(StageName), STEPS)),
         spline=replace(config.spline, fit_cell=0.1, steps=3, rounds=2),
         steps_factor=0.25 * config.steps_factor,
     )
