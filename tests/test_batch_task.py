@@ -32,7 +32,7 @@ def test_a_surface_leaves_what_run_leaves_and_tells_its_steps(told, formula_trai
     assert {"volume.npz", "solution.npz", "report.html"} <= {path.name for path in Path("out").iterdir()}
     shares = [message["share"] for _, message in told]
     assert told[0] == ("batch", {"number": 7, "stage": "S(2)", "share": 0.0})
-    assert shares == pytest.approx([0.0, 1 / 21, 2 / 21])
+    assert shares == pytest.approx([0.0, 1 / 15, 2 / 15])
     assert compute(task(), 7, "batch").report == ended.report  # finished already
 
 

@@ -122,9 +122,9 @@ def stages(change: Callable[[config.StageConfig], config.StageConfig | None]) ->
     return fast(changed)
 
 
-def no_stage(*names: str) -> Callable[[], None]:
-    """Leave stages of the training out."""
-    return stages(lambda stage: None if stage.name in names else stage)
+def no_stage(name: str) -> Callable[[], None]:
+    """Leave a stage of the training out."""
+    return stages(lambda stage: None if stage.name == name else stage)
 
 
 def share_of_steps(share: float) -> Callable[[], None]:
@@ -175,8 +175,6 @@ PARTS: dict[str, Part] = {
     "whitening": Part("the affine map before the network", train(whiten=False), starts_with("network")),
     "muon": Part("Muon: Adam trains all", train(matrix_rate=0.0), starts_with("network")),
     "S(1)": Part("the stage S(1)", no_stage("S(1)"), trained),
-    "corners and edges": Part("the stages that hold corners and edges", no_stage("corners", "edges"), trained),
-    "all but cube": Part("these three stages", no_stage("S(1)", "corners", "edges"), trained),
     "half the steps": Part("half of the steps after the first stage", share_of_steps(0.5), trained),
     "third of the steps": Part("two thirds of the steps after the first stage", share_of_steps(1.0 / 3.0), trained),
     "turning": Part("the turn of the cube before growth", put(on_cube, best_turn=lambda *_: np.eye(3)), ON_SPHERE),
