@@ -156,6 +156,10 @@ def test_report_on_a_ball():
     sagitta = 1.0 - np.sum(normals * corners[:, 0], axis=1)  # how deep the flat triangles lie below the sphere
     for distances in report["surface_distance"].values():  # the vertices are on the sphere, the triangles are not
         assert distances["as_given"]["max"] == pytest.approx(sagitta.max(), rel=0.1)
+    solid = np.einsum("ij,ij->", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])) / 6.0
+    assert report["volume"]["mesh"] == pytest.approx(solid, rel=1e-12)
+    assert report["volume"]["spline"] == pytest.approx(4.0 * np.pi / 3.0, rel=1e-3)
+    assert report["volume"]["difference"] == pytest.approx(report["volume"]["spline"] / solid - 1.0)
     both = report["surface_distance"]["two_sided"]
     assert both["of_diagonal"]["rms"] == pytest.approx(both["as_given"]["rms"] / 12.0**0.5, rel=1e-12)
 
@@ -172,6 +176,7 @@ def test_affine_report_by_hand():
         assert section["boundary"][scale] == {name: pytest.approx(size) for name in ("rms", "mean", "max")}
     for pair in section["surface_distance"].values():
         assert pair["as_given"]["max"] < 1e-12
+    assert section["volume"] == pytest.approx({"spline": 1.0, "mesh": 1.0, "difference": 0.0}, abs=1e-12)
     assert report.diagonal == pytest.approx(5.25**0.5)
     text = str(report)
     assert "certified" in text and "1.25, 1.25" in text and "10, 10" in text
@@ -218,6 +223,7 @@ def test_a_body_of_patches_by_hand():
         assert section["arap"][scale]["max"] < 1e-20
     assert [part["own_box"] for part in section["patches"]] == [pytest.approx([2, 1, 1]), pytest.approx([1, 1, 1])]
     assert [part["volume"] for part in section["patches"]] == pytest.approx([2.0, 1.0])
+    assert section["volume"] == pytest.approx({"spline": 3.0, "mesh": 3.0, "difference": 0.0}, abs=1e-12)
     assert [part["bijective"] for part in section["patches"]] == ["certified"] * 2
     assert section["boundary"]["as_given"] == {name: pytest.approx(0.1) for name in ("rms", "mean", "max")}
     for pair in section["surface_distance"].values():

@@ -42,6 +42,8 @@ def verdict_in_words(outcome: Outcome) -> str:
     if distance := verdict.get("surface_distance"):
         said = f"rms {distance['rms']:.3g}, largest {distance['max']:.3g} of the box's diagonal"
         lines.append(f"distance         {said}; surface to spline and back")
+    if volume := reports.volume_in_words(outcome.report):
+        lines.append(f"volume           {volume}")
     if chosen := reports.control_points_in_words(outcome.report):
         lines.append(f"control points   {chosen}")
     levels = [_level(level) for level in verdict.get("levels", [])]

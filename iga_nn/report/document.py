@@ -19,6 +19,7 @@ from ..version import __version__
 from .artifacts import REPORT, SOLVED
 
 SCHEMA = 1
+SAME_VOLUME = 1e-9  # per cent: rounding
 DEFECTS = ("unproved", "boundary_meeting", "misglued", "overlap")  # of the section `parameterization`
 
 Report = dict[str, Any]
@@ -131,6 +132,15 @@ def one_to_one(report: Report) -> str:
     if quality["bijective"] == "folded" or quality.get("boundary_injective") is False:
         return "no"
     return "yes" if quality["bijective"] == "certified" and quality.get("boundary_injective") else "undecided"
+
+
+def volume_in_words(report: Report) -> str:
+    """Return the spline's volume and how far it is from the mesh's; "" in a report without them."""
+    if not (volume := report["parameterization"].get("volume")):
+        return ""
+    percent, sense = 100.0 * abs(volume["difference"]), "less" if volume["difference"] < 0.0 else "more"
+    beside = f"{percent:.2g} % {sense} than the mesh's" if percent > SAME_VOLUME else "as the mesh's"
+    return f"{volume['spline']:.6g}, {beside}"
 
 
 def control_points_in_words(report: Report) -> str:

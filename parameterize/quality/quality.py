@@ -8,15 +8,17 @@ from typing import Any, Generic, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays import Array, in_brackets
+from ..arrays import Array, IntArray, in_brackets
 from ..certificate.body import BodyCertificate
 from ..certificate.boundary import BoundaryCheck
 from ..certificate.jacobian import Certificate
 from ..cube.boundary_map import BoundaryMap, on_faces
 from ..display import Shown
-from ..spline.multipatch import MultiPatch
+from ..spline.multipatch import MultiPatch, as_multipatch
+from ..spline.orientation import enclosed_volume
 from ..spline.volume import FACE_NAMES, BSplineVolume
 from ..surface.features import SHARP
+from ..surface.geometry import signed_volume
 from .distances import Distances
 from .distortion import BoxDistortion, Distortion, arap_grid, in_own_box
 from .proved import proved, proved_of
@@ -32,6 +34,23 @@ class BothScales(Generic[Measure]):  # noqa: UP046 - the new syntax needs Python
 
     unit_volume: Measure
     as_given: Measure
+
+
+@dataclass(frozen=True)
+class Volumes:
+    """The volumes of a spline, and of the solid inside its mesh, in the user's units."""
+
+    spline: float
+    mesh: float
+
+    @property
+    def difference(self) -> float:
+        """Return the spline's volume minus the mesh's, over the mesh's."""
+        return (self.spline - self.mesh) / self.mesh
+
+    def as_dict(self) -> dict[str, float]:
+        """Return the volumes and their difference."""
+        return asdict(self) | {"difference": self.difference}
 
 
 @dataclass(frozen=True)
@@ -64,6 +83,8 @@ class QualityReport(Shown):
         samples on this to the mesh; rms and mean over the area. `mesh_samples` and `spline_samples` say how many.
     surface_distance : BothScales of Distances
         Both ways together: rms and mean of the two, the largest of all samples.
+    volumes : Volumes
+        Of the spline, by its six faces (folded parts count with the opposite sign), and of the solid inside the mesh.
     diagonal : float
         Of the mesh's bounding box, in the user's units.
     mesh_samples, spline_samples : int
@@ -93,6 +114,7 @@ class QualityReport(Shown):
     mesh_to_spline: BothScales[Distances]
     spline_to_mesh: BothScales[Distances]
     surface_distance: BothScales[Distances]
+    volumes: Volumes
     diagonal: float
     mesh_samples: int
     spline_samples: int
@@ -111,6 +133,7 @@ class QualityReport(Shown):
                 "spline_to_mesh": asdict(self.spline_to_mesh),
                 "two_sided": asdict(self.surface_distance) | {"of_diagonal": asdict(self.relative_distance)},
             },
+            "volume": self.volumes.as_dict(),
             "sharp_edges": self.sharpness.as_dict(),
             "points": {
                 "arap": self.arap_points,
@@ -221,6 +244,7 @@ def measure(
         "mesh_to_spline": _both(found.mesh_to_spline.summary(), scale),
         "spline_to_mesh": _both(found.spline_to_mesh.summary(), scale),
         "surface_distance": _both(found.summary(), scale),
+        "volumes": _volumes(body, vertices, faces),
         "diagonal": float(np.linalg.norm(np.ptp(vertices, axis=0))),
         "mesh_samples": len(found.mesh_to_spline.distances),
         "spline_samples": len(found.spline_to_mesh.distances),
@@ -281,6 +305,12 @@ def _placed(body: BSplineVolume | MultiPatch, boundary: BoundaryMap, count: int)
             f"at {in_brackets(parameters[first])} of patch {patches[first]}"
         )
     return points
+
+
+def _volumes(body: BSplineVolume | MultiPatch, vertices: Array, faces: IntArray) -> Volumes:
+    middle = vertices.mean(axis=0)
+    enclosed = (abs(enclosed_volume(patch, middle)) for patch in as_multipatch(body))
+    return Volumes(sum(enclosed), abs(signed_volume(vertices - middle, faces)))
 
 
 def _both(as_given: Distances, scale: float) -> BothScales[Distances]:
