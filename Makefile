@@ -19,7 +19,7 @@ $(RUN): pyproject.toml constraints.txt
 	test -x $(BIN)/python || $(PYTHON) -m venv .venv
 	$(INSTALL) torch==2.13.0
 	$(INSTALL) -e .
-	out=$$(mktemp -d); $(BIN)/iga-nn run poisson cube --control-points 10 --steps-factor 0.02 --out $$out/cube; \
+	out=$$(mktemp -d); $(BIN)/iga-nn run poisson bean --control-points 10 --steps-factor 0.02 --out $$out/bean; \
 		code=$$?; rm -r $$out; test $$code -eq 0 -o $$code -eq 3
 	touch $@
 
