@@ -135,10 +135,7 @@ class Config:
         return replace(self, train=train, stages=stages, spline=spline, steps_factor=whole)
 
     def holding_edges(self) -> Config:
-        """Return the same options with the stages that hold corners and edges, also where the preset has none.
-
-        Corners that a user gives need them.
-        """
+        """Return the same options with the stages that hold corners and edges: corners that a user gives need them."""
         present = {stage.name for stage in self.stages}
         missing = (stage for stage in _HOLDING if stage.name not in present)
         added = (replace(stage, steps=scaled_steps(stage.steps, self.steps_factor)) for stage in missing)

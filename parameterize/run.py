@@ -172,6 +172,7 @@ def parameterize(
         raise TypeError(f"progress must be a function of a Progress, or None, got {progress!r:.80}")
     place, dtype = choose_device(device), choose_precision(dtype)
     given = given_corners(surface, corners, config)
+    config = config if given is None else config.holding_edges()
     identity = identity_of(surface, config, seed=seed, device=place, dtype=dtype, corners=given)
     checkpoints = Checkpoints(None if checkpoint_dir is None else Path(checkpoint_dir), identity, resume=resume)
     history, seconds = History(), dict[str, float]()

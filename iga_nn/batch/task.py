@@ -40,9 +40,7 @@ def compute(task: Task, number: int, batch: str) -> Ended:
     """
     from distributed import get_worker
 
-    config = task.mapping.config()
-    trained = config.stages if task.mapping.corners is None else config.holding_edges().stages
-    worker, stages = get_worker(), [*(stage.name for stage in trained), "layout", "spline"]
+    worker, stages = get_worker(), [stage.name for stage in task.mapping.config().stages] + ["layout", "spline"]
 
     def tell(now: Progress) -> None:
         share = (stages.index(now.stage) + now.step / max(now.steps, 1)) / len(stages)

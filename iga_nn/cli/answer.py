@@ -43,7 +43,7 @@ def verdict_in_words(outcome: Outcome) -> str:
         said = f"rms {distance['rms']:.3g}, largest {distance['max']:.3g} of the box's diagonal"
         lines.append(f"distance         {said}; surface to spline and back")
     if volume := reports.volume_in_words(outcome.report):
-        lines.append(f"volume           {volume}")
+        lines.append(f"volume           {', '.join(volume)}")
     if chosen := reports.control_points_in_words(outcome.report):
         lines.append(f"control points   {chosen}")
     levels = [_level(level) for level in verdict.get("levels", [])]

@@ -93,6 +93,8 @@ class MapOptions(SurfaceOptions):
             raise InputError(f"seed {self.seed}: must not be negative")
         with input_errors():
             config = preset(self.preset).scaled(self.steps_factor)
+            if self.corners is not None:
+                config = config.holding_edges()
             config = config.with_blocks(None if self.blocks == "auto" else self.blocks)
             if self.control_points == "auto":
                 return config.refined(self.tolerance, self.max_control_points)

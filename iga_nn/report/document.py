@@ -134,13 +134,13 @@ def one_to_one(report: Report) -> str:
     return "yes" if quality["bijective"] == "certified" and quality.get("boundary_injective") else "undecided"
 
 
-def volume_in_words(report: Report) -> str:
-    """Return the spline's volume and how far it is from the mesh's; "" in a report without them."""
+def volume_in_words(report: Report) -> tuple[str, ...]:
+    """Return the spline's volume, and how far it is from the mesh's; nothing of a report without them."""
     if not (volume := report["parameterization"].get("volume")):
-        return ""
+        return ()
     percent, sense = 100.0 * abs(volume["difference"]), "less" if volume["difference"] < 0.0 else "more"
     beside = f"{percent:.2g} % {sense} than the mesh's" if percent > SAME_VOLUME else "as the mesh's"
-    return f"{volume['spline']:.6g}, {beside}"
+    return f"{volume['spline']:.6g}", beside
 
 
 def control_points_in_words(report: Report) -> str:

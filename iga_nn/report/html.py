@@ -150,7 +150,7 @@ def _facts(report: Report) -> list[tuple[str, str, str]]:
         remark = f"rms over the box's diagonal, surface to spline and back; largest {distance['max']:.3g}"
         facts.append(("Distance to the surface", f"{distance['rms']:.3g}", remark))
     if volume := reports.volume_in_words(report):
-        number, beside = volume.split(", ")
+        number, beside = volume
         facts.append(("Volume", number, beside))
     if levels := reports.solved(report).get("levels"):
         finest = levels[-1]

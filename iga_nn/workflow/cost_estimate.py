@@ -140,12 +140,11 @@ def _training_steps(config: Config, corners: bool) -> tuple[float, float]:
 
     The first stage shows whether a surface is hard. corners: whether they are given: then there is one start.
     """
-    stages, limit = (config.holding_edges() if corners else config).stages, config.train.easy_loss
-    steps = sum(stage.steps for stage in stages)
-    steps += math.ceil(config.train.race * next((stage.steps for stage in stages if stage.name == "cube"), 0))
+    steps, limit = sum(stage.steps for stage in config.stages), config.train.easy_loss
+    steps += math.ceil(config.train.race * next((stage.steps for stage in config.stages if stage.name == "cube"), 0))
     if limit is None or config.starts == 1 or corners:
         return steps, steps
-    return (0, 0) if limit == 0.0 else (steps, stages[0].steps)
+    return (0, 0) if limit == 0.0 else (steps, config.stages[0].steps)
 
 
 def _growths(most: int, control_points: int) -> list[float]:

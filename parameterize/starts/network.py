@@ -37,11 +37,10 @@ class Network(Start):
         others = task.most_starts > 1
         if others and task.config.train.easy_loss == 0.0:  # every shape counts as hard
             return None
-        config = task.config if task.given_corners is None else task.config.holding_edges()
         with timed(task.seconds, "train"), one_thread_an_operation():
             trainer = Trainer(
                 *task.mesh,
-                config,
+                task.config,
                 seed=task.seed,
                 device=task.device,
                 dtype=task.dtype,
