@@ -37,7 +37,7 @@ def started(name, turn=7, amplitude=0.08):
     energy = SplineEnergy(spline.nets, fit, Weights())
     energy.determinants.activate(all_spans(spline.nets))
     energy.start_round(spline.control, 50.0)
-    energy.anchors.aim(spline.control, hold=False)
+    energy.anchors.aim(spline.control)
     energy.slide(spline.control)
     return energy, spline.control
 

@@ -105,7 +105,7 @@ def state_of(control, fit=None, number=4):
     fit = (fit or surface_fit()).on_nets(NETS)
     places = fit.places.parameters, fit.places.cube_faces
     best = Optimized.of(SplineMap.on_cube(3, KNOTS, control))
-    state = State(SplineEnergy(NETS, fit, Weights()), best.spline, best, places, near=False, number=number, halved=2)
+    state = State(SplineEnergy(NETS, fit, Weights()), best.spline, best, places, number=number, halved=2)
     state.best_square = fit.mean_square(best.spline.control)
     return state
 

@@ -34,7 +34,6 @@ from iga_nn.workflow.worker_run import Ended
 from parameterize import attempts, config
 from parameterize.files import save_text
 from parameterize.optimization import phases, rounds
-from parameterize.optimization.acceleration import Acceleration
 from parameterize.optimization.edge_attraction import EdgeAnchors
 from parameterize.optimization.endings import Reason
 from parameterize.starts import extension, growth, network, on_cube, start
@@ -132,19 +131,6 @@ def share_of_steps(share: float) -> Callable[[], None]:
     return stages(lambda stage: replace(stage, steps=config.scaled_steps(stage.steps, share)))
 
 
-def aim_unless(held: bool) -> Callable[[], None]:
-    """Let anchors aim at nothing, in one of their two modes."""
-    aim = EdgeAnchors.aim
-
-    def other(anchors: EdgeAnchors, control: Any, *, hold: bool) -> None:
-        if hold is held:
-            anchors.release()
-        else:
-            aim(anchors, control, hold=hold)
-
-    return put(EdgeAnchors, aim=other)
-
-
 def ended(phase: type[phases.Phase], reason: Reason) -> Callable[[], None]:
     """Let a phase end before its first round."""
     return put(phase, done=lambda *_: reason)
@@ -194,9 +180,9 @@ PARTS: dict[str, Part] = {
     "parting": Part("pushing apart a boundary that meets itself", ended(phases.Separate, Reason.APART), PARTING),
     "polish": Part("giving the surface its weight back", ended(phases.Polish, Reason.LESS_POLISHED), POLISHING),
     "moving back": Part("moving back near spans that fold again", put(phases, _MENDINGS=0), POLISHING),
-    "held edges": Part("anchors that hold edges in the first rounds", aim_unless(held=True)),
-    "drawn edges": Part("anchors that draw edges to the surface", aim_unless(held=False), POLISHING),
-    "Anderson": Part("Anderson's guess at the limit of the steps", put(Acceleration, guess=lambda _: None)),
+    "drawn edges": Part(
+        "anchors that draw edges to the surface", put(EdgeAnchors, aim=lambda anchors, _: anchors.release()), POLISHING
+    ),
 }
 
 

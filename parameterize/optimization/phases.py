@@ -24,7 +24,7 @@ _log = logging.getLogger(__name__)
 
 FULL_PENALTY = 2500.0  # weight on det J once F has its shape: folds open even against the surface's data
 RAMP = (20.0, 100.0, 500.0, FULL_PENALTY)  # one a round, for a map that starts folded: it takes its shape through folds
-PATIENT_ROUNDS = 2  # of a stage: after them anchors let go, and the penalty grows at unproved spans
+PATIENT_ROUNDS = 2  # of a stage: after them the penalty grows at unproved spans
 FIRM_ROUNDS = 4  # after these the surface gives way at unproved spans, which more weight alone has not unfolded
 GIVING_WAY = 0.25  # factor of the surface's weights there, each round: an edge in a valley cannot lie on the surface
 _CONTACT_WAY = 0.0625  # the same where the boundary meets itself: these rounds are few
@@ -57,14 +57,8 @@ class Phase(ABC):
         return self.penalties[min(number, len(self.penalties) - 1)]
 
     def begin(self, state: State) -> None:
-        """Set the weights of the data and of the anchors for the next round.
-
-        In the first rounds the anchors hold a map that started close to the surface.
-        """
-        if state.near and state.number < PATIENT_ROUNDS:
-            state.energy.anchors.aim(state.spline.control, hold=True)
-        else:
-            state.energy.anchors.release()
+        """Set the weights of the data and of the anchors for the next round."""
+        state.energy.anchors.release()
 
     def amended(self, state: State, found: Optimized) -> Optimized:
         """Return the map that a round has found, or a better map made from it."""
@@ -148,7 +142,7 @@ class Separate(Phase):
         energy.give_way(energy.watch_contact(control), _CONTACT_WAY)
         super().begin(state)
         if not energy.nets.one_cube:
-            energy.anchors.aim(control, hold=True)
+            energy.anchors.aim(control)
             if not state.rounds[self.name]:
                 reassign(energy.surface, control, first=True)
 
@@ -176,7 +170,7 @@ class Polish(Phase):
             energy.watch_contact(state.spline.control)
         if state.settled:
             energy.take_back(GIVING_WAY)
-        energy.anchors.aim(state.spline.control, hold=False)
+        energy.anchors.aim(state.spline.control)
 
     def amended(self, state: State, found: Optimized) -> Optimized:
         """Move the spans that fold again back to their certified shape; return the given map where that fails."""

@@ -60,7 +60,7 @@ def optimize(
             energy.determinants.activate(watched)
         first = Optimized.of(start)
         places = surface.places.parameters, surface.places.cube_faces
-        state = State(energy, start, first, places, energy.anchors.near(start.control), number=begun, halved=begun)
+        state = State(energy, start, first, places, number=begun, halved=begun)
         state.restore(checkpoints, history)
         for phase in schedule.phases:
             while (reason := phase.done(state)) is None and state.number < schedule.rounds:

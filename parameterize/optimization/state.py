@@ -27,7 +27,6 @@ class State:
     spline: SplineMap
     best: Optimized
     best_places: tuple[Array, IntArray]  # the surface's parameters (N, 3) that belong to it, and their faces (N,)
-    near: bool  # whether F was close to the surface all along the blocks' edges to begin with
     number: int  # of rounds done, those on other knots among them
     halved: int  # the round in which the number of unproved spans was last halved
     certified: bool = False  # whether a round on these knots, one in which F does not grow, has certified the map
