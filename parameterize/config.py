@@ -95,9 +95,9 @@ class Config:
     refinement : RefinementConfig or None
         Where knots are inserted after the spline stage; None: the control points of `spline` are all there are.
     starts : int
-        The tries in all, at most 5: where a shape is hard to train, or the trained map is not certified, one is grown.
-        Where that is not certified or meets itself, a layout is extended and a stiffer map grown; in the end one that
-        may be farther from the surface.
+        The tries in all, at most 4: where a shape is hard to train, or the trained map is not certified, one is grown.
+        Where that is not certified or meets itself, a stiffer map is grown; in the end one that may be farther from
+        the surface.
     blocks : int or None
         The most blocks of a map: 1 for one cube, a larger number for blocks along the skeleton, None for whichever
         suits the body.
@@ -116,7 +116,7 @@ class Config:
     train: TrainConfig
     stages: tuple[StageConfig, ...]
     spline: SplineConfig
-    starts: int = 5
+    starts: int = 4
     refinement: RefinementConfig | None = None
     blocks: int | None = None
     steps_factor: float = 1.0

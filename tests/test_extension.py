@@ -1,20 +1,14 @@
 """The extension of a surface's layout into the solid: values on its surface, sheets that are close, a folded sheet."""
 
 import tracemalloc
-from dataclasses import replace
 
 import numpy as np
 import pytest
 import trimesh
 from shapes import ball, turned
-from small_run import tiny_config
 
-from parameterize import attempts, parameterize
-from parameterize.config import preset
 from parameterize.cube.layout import CubeLayout
 from parameterize.extension import extended
-from parameterize.starts.start import Task
-from parameterize.surface.surface import surface_from_arrays
 
 CELL = 0.07
 
@@ -78,33 +72,3 @@ def test_a_needle_askew_takes_the_memory_of_what_is_in_it():
     within = ((inside >= 0.0) & (inside <= 100.0)).all(axis=1)  # places are cut off at the cube's faces
     assert places[within] == pytest.approx(inside[within] / 100.0, abs=1e-4)
     assert taken < 250e6  # a number for each point of the box would take 500, and there were several
-
-
-def sheet_folded_once(count=900):
-    """A thick sheet bent by 300 degrees, so that its ends come close."""
-    points, faces = ball(count)
-    angle, radius = 0.8 * np.pi * points[:, 0], 1.2 + 0.35 * points[:, 1]
-    bent = np.stack([radius * np.sin(angle), radius * np.cos(angle), 0.8 * points[:, 2]], axis=1)
-    return surface_from_arrays(bent, faces, "sheet")
-
-
-def test_a_sheet_folded_once_is_certified_by_extension(caplog, few_distances, monkeypatch):
-    monkeypatch.setattr(attempts, "STARTS", (attempts.NETWORK, attempts.EXTENSION))
-    monkeypatch.setattr("parameterize.starts.extension.CELL", CELL)
-    monkeypatch.setattr(Task, "ridges", None)  # the coarse mesh has a sharp rim
-    config = tiny_config()
-    config = replace(
-        config,
-        starts=2,
-        train=replace(config.train, easy_loss=0.0),
-        spline=replace(preset("fast").spline, control_points=8),
-        steps_factor=1.0,
-    )
-    with caplog.at_level("INFO"):
-        result = parameterize(sheet_folded_once(), config, device="cpu")
-    assert "extending the surface's layout into the solid instead" in caplog.text
-    assert result.origin == "extension"
-    assert [attempt.start for attempt in result.attempts] == ["network", "extension"]
-    assert result.certificate.verdict == "certified"
-    assert result.quality.boundary_check.injective is True
-    assert result.quality.boundary.unit_volume.rms < 0.02

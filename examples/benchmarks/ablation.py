@@ -36,7 +36,7 @@ from parameterize.files import save_text
 from parameterize.optimization import phases, rounds
 from parameterize.optimization.edge_attraction import EdgeAnchors
 from parameterize.optimization.endings import Reason
-from parameterize.starts import extension, growth, network, on_cube, start
+from parameterize.starts import growth, network, on_cube, sharp, start
 
 WHOLE = "nothing"  # is left out
 Tried = list[dict[str, Any]]  # the attempts of a report
@@ -145,14 +145,13 @@ def raised_floors() -> None:
 
 
 STIFFER = ("stiff growth", "last growth")
-ON_CUBE = ("growth", *STIFFER, "extension")  # these start from the surface on a sphere, and then on the cube
+ON_CUBE = ("growth", *STIFFER)  # these start from the surface on a sphere, and then on the cube
 GROWN, ON_SPHERE = starts_with("growth", *STIFFER), starts_with(*ON_CUBE)
 UNFOLDING, PARTING, POLISHING = has_phase("unfold", 1), has_phase("separate"), has_phase("polish")
 PARTS: dict[str, Part] = {
     "network": Part("the trained network: every map is grown", train(easy_loss=0.0), trained),
     "giving up": Part("giving up the training: every map is trained to the end", train(easy_loss=None), GROWN),
     "growth": without_start("growth"),
-    "extension": without_start("extension"),
     "stiff growth": without_start("stiff growth"),
     "last growth": without_start("last growth"),
     "sharp edges": Part("the start along sharp edges", put(start.Task, ridges=None), starts_with("sharp edges")),
@@ -166,7 +165,7 @@ PARTS: dict[str, Part] = {
     "turning": Part("the turn of the cube before growth", put(on_cube, best_turn=lambda *_: np.eye(3)), ON_SPHERE),
     "coarse rounds": Part(
         "first rounds on fewer control points",
-        together(put(network, COARSE=1.0), put(extension, COARSE=1.0), put(growth, _COARSE=1.0)),
+        together(put(network, COARSE=1.0), put(sharp, COARSE=1.0), put(growth, _COARSE=1.0)),
         starts_with("network", *ON_CUBE),
     ),
     "lowered floors": Part("floors of det J that are lowered in thin parts", raised_floors, starts_with(*STIFFER)),

@@ -17,6 +17,8 @@ Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 Triangles = tuple[Array, IntArray]  # vertices (n, 3) and faces (m, 3), wound outward
 Field = Callable[[Array], Array]  # points (n, 3) -> values (n,)
+_MOVES = 4  # of Newton's method onto the surface
+_FLATTEST = 0.1  # the squared slope is at least so large: at a crease it may vanish
 
 
 def capsule(a: ArrayLike, b: ArrayLike, radius: float, end_radius: float | None = None) -> Field:
@@ -129,6 +131,17 @@ def evened(vertices: Array, faces: IntArray, count: int) -> Triangles:
     """Return a surface of about `count` faces of even size, by collapses of its shortest edges."""
     points, triangles, *_ = igl.decimate(vertices, faces, count, block_intersections=True)
     return np.asarray(points), np.asarray(triangles, dtype=np.int64)
+
+
+def on_zero(distance: Field, points: Array) -> Array:
+    """Return points (n, 3) near the surface where a field is zero, moved onto it: collapses leave them beside it."""
+    step = 1e-4 * np.eye(3)
+    for _ in range(_MOVES):
+        slopes = [(distance(points + axis) - distance(points - axis)) / 2e-4 for axis in step]
+        slope = np.stack(slopes, axis=1)
+        square = np.maximum(np.sum(slope**2, axis=1), _FLATTEST)
+        points = points - (distance(points) / square)[:, None] * slope
+    return points
 
 
 def has_genus(faces: IntArray, genus: int) -> bool:

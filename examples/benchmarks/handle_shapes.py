@@ -93,6 +93,10 @@ LIMBS = {
     "octopus": Shape(limbed.octopus, 0),
     "dog": Shape(limbed.dog, 0),
     "starfish": Shape(limbed.starfish, 0),
+    "gecko": Shape(limbed.gecko, 0),
+    "brittle_star": Shape(limbed.brittle_star, 0),
+    "giraffe": Shape(limbed.giraffe, 0),
+    "mannequin": Shape(limbed.mannequin, 0),
     "ant": Shape(limbed.ant, 0),
 }
 SHAPES = HANDLES | KNOTTED | EVERYDAY | LIMBS

@@ -1,4 +1,4 @@
-"""Lays the surface on the cube without a flipped triangle; growth and extension start from this layout."""
+"""Lays the surface on the cube without a flipped triangle; growth and the start along sharp edges use this layout."""
 
 from dataclasses import replace
 

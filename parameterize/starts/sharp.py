@@ -9,21 +9,23 @@ from dataclasses import dataclass, replace
 
 from ..arrays import IntArray
 from ..checkpoint import Checkpoints
+from ..config import SplineConfig
 from ..cube.carried import OFF_RIDGES, Carried, carried, choose_sharp_corners
 from ..cube.cube import snap
 from ..cube.edge_paths import PathError, lay_out
 from ..cube.layout import CubeLayout
 from ..extension import extended
+from ..optimization.phases import Polish, Schedule, Separate, Shape, Unfold
 from ..progress import timed
 from ..surface.ridges import Ridges
 from ..threads import one_blas_thread
-from .extension import CELL, schedule
 from .first_spline import COARSE, first_spline
-from .on_cube import surface_on_cube
+from .on_cube import MORE_ROUNDS, USUAL_STEPS, surface_on_cube
 from .start import ALL, Attempt, Start, Task, optimized
 
 _log = logging.getLogger(__name__)
 
+_CELL = 0.0255  # of the lattice inside, in a domain of volume 1: some 60 000 points, more than F has control points
 _TURNS = 3  # of the cube that are tried, until twelve paths are found: corners on sharp edges hardly depend on it
 
 
@@ -42,8 +44,13 @@ class Sharp(Start):
                 return None
             layout, kept = found
             fit = task.fit(layout, COARSE, kept)
-            first = first_spline(*extended(layout, CELL), fit)
+            first = first_spline(*extended(layout, _CELL), fit)
         return optimized(first, fit, schedule(task.config.spline), task, checkpoints)
+
+
+def schedule(spline: SplineConfig) -> Schedule:
+    """Return the phases of the rounds: the first map is close to the last, so folds have a large penalty at once."""
+    return Schedule((Shape(), Unfold(), Separate(), Polish()), spline.rounds + MORE_ROUNDS, USUAL_STEPS)
 
 
 SHARP = Sharp("sharp edges", "extension", "laying the cube's edges along sharp edges")
