@@ -5,6 +5,7 @@ a stack of extrusions from columns.
 """
 
 import logging
+import math
 
 from .blocks.layout import LayoutError
 from .checkpoint import Checkpoints
@@ -67,7 +68,8 @@ def _serves(one: Tried) -> bool:
         return False
     if one.start is SHARP and one.attempt.found.injective is None:
         return False
-    return one.start is not BLOCKS or max(one.attempt.distance, one.attempt.distance_back) <= GROWTH.far
+    both_ways = math.hypot(one.attempt.distance, one.attempt.distance_back) / math.sqrt(2.0)
+    return one.start is not BLOCKS or both_ways <= GROWTH.far
 
 
 def attempts(task: Task, checkpoints: Checkpoints) -> tuple[Tried, ...]:
