@@ -175,7 +175,6 @@ PARTS: dict[str, Part] = {
         together(put(phases, GIVING_WAY=1.0, _CONTACT_WAY=1.0), put(rounds, GIVING_WAY=1.0)),
         UNFOLDING,
     ),
-    "smoothing": Part("smoothing near a few unproved spans", put(phases, _MOST_SMOOTHED=0), UNFOLDING),
     "parting": Part("pushing apart a boundary that meets itself", ended(phases.Separate, Reason.APART), PARTING),
     "polish": Part("giving the surface its weight back", ended(phases.Polish, Reason.LESS_POLISHED), POLISHING),
     "drawn edges": Part(
