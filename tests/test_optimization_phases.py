@@ -119,6 +119,24 @@ def test_a_polish_gives_the_data_more_weight_unless_the_map_folds_again():
     assert np.all(fit.yielding == 0.4)
 
 
+@pytest.mark.parametrize(("number", "smooth"), [(3, False), (4, True)])
+def test_few_spans_that_stay_unproved_are_smoothed(number, smooth):
+    folded = cube()
+    folded[0, 6, 6, 6] += 0.33
+    found = Optimized.of(SplineMap.on_cube(3, KNOTS, folded))
+    assert 0 < len(found.unproved) <= 10
+    amended = Unfold().amended(state_of(cube(), number=number), found)
+    assert (amended.certificate.verdict == "certified") == smooth and (amended is found) != smooth
+
+
+def test_many_spans_are_not_smoothed(monkeypatch):
+    folded = cube()
+    folded[0, 6, 6, 6] += 0.33
+    monkeypatch.setattr("parameterize.optimization.phases._MOST_SMOOTHED", 0)
+    found = Optimized.of(SplineMap.on_cube(3, KNOTS, folded))
+    assert Unfold().amended(state_of(cube()), found) is found
+
+
 def test_the_surface_gives_way_where_sheets_are_pushed_apart(monkeypatch):
     state = state_of(cube())
     monkeypatch.setattr(SplineEnergy, "watch_contact", lambda *_: np.array([[0, 0, 5, 5]]))

@@ -158,6 +158,23 @@ def test_a_folded_start_is_unfolded():
     assert mean_arap(as_volume(found.spline.control)) < mean_arap(as_volume(start))
 
 
+def test_smoothing_bends_least_next_to_the_spans_and_moves_nothing_else():
+    knots = (open_uniform_knots(14, 3),) * 3
+    row = greville(knots[0], 3)
+    control = np.stack(np.meshgrid(row, row, row, indexing="ij"))
+    around = np.array([[0, 4, 4, 4]])
+    folded = control.copy()
+    folded[:, 6, 6, 6] += 0.4
+    nets = Nets(3, (knots,))
+    energy = SplineEnergy(nets, surface_fit().on_nets(nets), Weights())
+    smoothed = energy.smoothed(folded.reshape(3, -1), around).reshape(folded.shape)
+    assert np.allclose(smoothed, control, atol=1e-7)  # a cube bends nowhere
+    folded[:, 10, 6, 6] += 0.4  # spans 3 to 5 need the points 3 to 8
+    smoothed = energy.smoothed(folded.reshape(3, -1), around).reshape(folded.shape)
+    moved = np.argwhere((smoothed != folded).any(axis=0))
+    assert moved.min() == 3 and moved.max() == 8 and len(moved) == 6**3
+
+
 def test_what_gave_way_counts_again_once_the_map_is_certified():
     start, fit = wavy_control(0.08), surface_fit()
     fit.give_way(np.full(len(fit.points), 0.05))

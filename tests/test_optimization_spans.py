@@ -3,7 +3,7 @@ import pytest
 from block_bodies import BODIES, rod, sampled, uniform_nets
 
 from parameterize.optimization.sliding import SlidingParameters
-from parameterize.optimization.spans import edge_spans, in_blocks, numbers, with_neighbours
+from parameterize.optimization.spans import acting_on, edge_spans, in_blocks, numbers, with_neighbours
 
 
 def test_edge_spans():
@@ -14,7 +14,7 @@ def test_edge_spans():
     assert len(edge_spans(uniform_nets((2, 2, 2)))) == 8 and len(edge_spans(uniform_nets((1, 1, 1)))) == 1
 
 
-def test_neighbours():
+def test_neighbours_and_the_control_points_that_act():
     nets = uniform_nets((4, 5, 6))
     marked = with_neighbours(np.array([[0, 0, 2, 3]]), nets).reshape(4, 5, 6)
     assert np.argwhere(marked).min(axis=0).tolist() == [0, 1, 2] and np.argwhere(marked).max(axis=0).tolist() == [
@@ -23,6 +23,10 @@ def test_neighbours():
         4,
     ]
     assert marked.sum() == 2 * 3 * 3
+    one = np.zeros((4, 5, 6), dtype=bool)
+    one[1, 2, 3] = True
+    acting = np.argwhere(acting_on(one.ravel(), nets).reshape(7, 8, 9))  # spans 1, 2 and 3: four functions a direction
+    assert acting.min(axis=0).tolist() == [1, 2, 3] and acting.max(axis=0).tolist() == [4, 5, 6] and len(acting) == 4**3
 
 
 TURNS = (0, 5, 7, 11)
@@ -63,6 +67,26 @@ def test_neighbours_are_the_spans_that_share_a_corner_in_space(name, turn):
         spans = in_blocks([np.indices(counts).reshape(3, -1).T for counts in nets.spans])[chosen]
         apart = np.linalg.norm(corners[:, :, None] - own, axis=-1).min(axis=(1, 2))
         assert np.array_equal(with_neighbours(spans, nets), apart < 1e-9)
+
+
+@pytest.mark.parametrize(("name", "turn"), ALL)
+def test_control_points_that_act_are_those_that_move_the_map_there(name, turn):
+    """A control point moves together with those that interfaces make one with it."""
+    spline = BODIES[name](turn)
+    nets = spline.nets
+    chosen = np.zeros(nets.first_spans[-1], dtype=bool)
+    chosen[[0, 8, -1]] = True
+    acting = acting_on(chosen, nets)
+    spans = np.flatnonzero(chosen)
+    blocks = np.searchsorted(nets.first_spans, spans, "right") - 1
+    expected = np.zeros(nets.starts[-1])
+    for number, block in zip(spans, blocks, strict=True):
+        place = np.unravel_index(number - nets.first_spans[block], nets.spans[block])
+        window = np.zeros(nets.shapes[block])
+        window[tuple(slice(i, i + nets.degree + 1) for i in place)] = 1.0
+        expected[nets.starts[block] : nets.starts[block + 1]] += window.ravel()
+    assert np.array_equal(acting, nets.merged(expected) > 0.0)
+    assert np.array_equal(nets.merged_mask(acting), acting) and not acting.all()
 
 
 def test_points_near_spans_are_found_across_an_interface():

@@ -65,6 +65,21 @@ def test_values_that_agree_and_those_inside_stay(nets):
     assert np.array_equal(nets.merged(ones), ones)
 
 
+def test_a_mask_gains_what_is_one_with_its_points():
+    nets = rod(7).nets
+    (interface,) = nets.interfaces
+    assert interface.swapped and any(interface.flipped)
+    (_, face), (_, other) = interface.first, interface.second
+    chosen = np.zeros(nets.starts[-1], dtype=bool)
+    layer = face_layer(nets.of_block(np.arange(nets.starts[-1]), 0), face)
+    partners = interface.turned(face_layer(nets.of_block(np.arange(nets.starts[-1]), 1), other))
+    chosen[layer[1, 4]] = chosen[nets.starts[1] - 1 - layer[1, 4]] = True
+    found = np.flatnonzero(nets.merged_mask(chosen) & ~chosen).tolist()
+    inside = nets.starts[1] - 1 - layer[1, 4]
+    assert inside not in layer
+    assert found == [partners[1, 4]]
+
+
 def test_exposed_faces_are_those_that_are_not_glued(nets):
     glued = {(block, axis_side(face)) for one in nets.interfaces for block, face in (one.first, one.second)}
     for number, exposed in enumerate(nets.exposed):

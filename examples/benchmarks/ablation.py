@@ -34,6 +34,7 @@ from iga_nn.workflow.worker_run import Ended
 from parameterize import attempts, config
 from parameterize.files import save_text
 from parameterize.optimization import phases, rounds
+from parameterize.optimization.acceleration import Acceleration
 from parameterize.optimization.edge_attraction import EdgeAnchors
 from parameterize.optimization.endings import Reason
 from parameterize.starts import growth, network, on_cube, sharp, start
@@ -175,11 +176,13 @@ PARTS: dict[str, Part] = {
         together(put(phases, GIVING_WAY=1.0, _CONTACT_WAY=1.0), put(rounds, GIVING_WAY=1.0)),
         UNFOLDING,
     ),
+    "smoothing": Part("smoothing near a few unproved spans", put(phases, _MOST_SMOOTHED=0), UNFOLDING),
     "parting": Part("pushing apart a boundary that meets itself", ended(phases.Separate, Reason.APART), PARTING),
     "polish": Part("giving the surface its weight back", ended(phases.Polish, Reason.LESS_POLISHED), POLISHING),
     "drawn edges": Part(
         "anchors that draw edges to the surface", put(EdgeAnchors, aim=lambda anchors, _: anchors.release()), POLISHING
     ),
+    "Anderson": Part("Anderson's guess at the limit of the steps", put(Acceleration, guess=lambda _: None)),
 }
 
 

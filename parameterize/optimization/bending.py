@@ -13,7 +13,7 @@ from numpy.typing import DTypeLike
 from ..arrays import Array, Floats, Knots
 from ..spline.bspline import collocation, gauss_points
 from ..spline.nets import Nets
-from .blockwise import Blockwise
+from .blockwise import Blockwise, side_by_side
 from .operators import PiecewiseOperator
 from .tensor_product import Band, apply_band, band
 from .term import RoundWeights
@@ -55,15 +55,14 @@ def bending_operator(matrices: Grams, weight: float, dtype: DTypeLike = np.float
 class BlockFairness:
     """Compute the term weight * int |Hessian F|^2 over a block, which is quadratic in the control points.
 
-    mass: the three matrices (n, n) of the integrals of products of basis functions.
+    bend: the second derivative of the term, in double precision. mass: the three matrices (n, n) of the integrals of
+    products of basis functions.
     """
 
     def __init__(self, knots: Knots, degree: int, weight: float) -> None:
         self._weight, matrices = weight, grams(knots, (degree,) * 3)
         self.mass, self._slope, self._curve = matrices
-        self._bend, self._rough = (
-            bending_operator(matrices, 2.0 * weight, dtype) for dtype in (np.float64, np.float32)
-        )
+        self.bend, self._rough = (bending_operator(matrices, 2.0 * weight, dtype) for dtype in (np.float64, np.float32))
 
     def weight(self, weights: RoundWeights) -> float:
         """Return 1, because the operators already contain the weight."""
@@ -71,7 +70,7 @@ class BlockFairness:
 
     def energy_and_gradient(self, control: Array) -> tuple[float, Array]:
         """Return the term at control points (3, n_u, n_v, n_w), and its gradient of the same shape."""
-        bent = self._bend(control)
+        bent = self.bend(control)
         return 0.5 * float(np.vdot(bent, control)), bent
 
     def curvature(self, control: Array) -> PiecewiseOperator:
@@ -84,10 +83,14 @@ class BlockFairness:
 
 
 class Fairness(Blockwise[BlockFairness]):
-    """Compute the fairness of all blocks; knots: of each block, in the units of the distortion."""
+    """Compute the fairness of all blocks; knots: of each block, in the units of the distortion.
+
+    bend: the second derivative of the term, in double precision.
+    """
 
     def __init__(self, nets: Nets, knots: tuple[Knots, ...], weight: float) -> None:
         super().__init__(nets, [BlockFairness(rows, nets.degree, weight) for rows in knots])
+        self.bend = side_by_side(nets, [term.bend for term in self.terms])
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]

@@ -23,6 +23,7 @@ from .face_attraction import faces_towards
 from .normals import FacingPenalty, facing_penalty
 from .operators import weighted_sum
 from .reassignment import reassign
+from .spans import acting_on, with_neighbours
 from .surface_distance import SurfaceFit
 from .tensor_product import FastDiagonalization
 from .term import RoundWeights, Term, Weights
@@ -31,6 +32,7 @@ _REACH = 0.03  # while F grows, surface points farther from F than this do not s
 _RELAXATIONS = 1  # sweeps over the triangles that these flipped: after every step, so that flips do not pile up
 _PULL = 3e-4  # share of the surface's weight in the preconditioner: more would hold back slides along the surface
 _TOLERANCE, _ITERATIONS = 0.1, 20  # of a Newton direction, relative and at most: a better one does not save steps
+_SMOOTH_TOLERANCE, _SMOOTH_ITERATIONS = 1e-8, 5000  # of `smoothed`, whose result is a map and no direction
 
 
 class SplineEnergy:
@@ -176,6 +178,21 @@ class SplineEnergy:
             energy += weight * value
             gradient += weight * slope
         return energy, self.nets.merged(gradient)
+
+    def smoothed(self, control: Array, spans: IntArray) -> Array:
+        """Return control points that bend F least in and next to the spans (k, 4); all other control points stay.
+
+        Unlike the penalty on det J, this does not depend on which side of a fold has the wrong orientation.
+        """
+        free = acting_on(with_neighbours(spans, self.nets), self.nets)
+        moved = conjugate_gradients(
+            lambda x: self.nets.merged(self.fairness.bend(x) * free),
+            -self.nets.merged(self.fairness.bend(control) * free),
+            lambda x: x,
+            tolerance=_SMOOTH_TOLERANCE,
+            max_iterations=_SMOOTH_ITERATIONS,
+        ).x
+        return control + moved
 
     def newton_direction(self, control: Array, right: Array, damping: float = 0.0) -> Array:
         """Return an approximate solution of (Hessian + damping) x = right at `control`, with fixed parameters."""

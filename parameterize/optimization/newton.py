@@ -1,7 +1,8 @@
 """Makes one round of truncated Newton steps on the energy of energy.py, and decides when the round ends.
 
-The boundary's parameters slide between steps (surface_distance.py). Steps and slides alternate and converge linearly;
-Anderson's acceleration of the two earned nothing on twelve models (ARAP and distance 1.01 times without it).
+The boundary's parameters slide between steps (surface_distance.py). Alternate steps and slides converge linearly;
+acceleration.py guesses the limit, and the guess is used where its energy is lower. On twelve models it earns a hundredth
+of the distortion; without it and the smoothing of phases.py, one of nine hard surfaces ended twice as far.
 """
 
 import logging
@@ -10,10 +11,12 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from ..arrays import Array
+from .acceleration import Acceleration
 from .energy import SplineEnergy
 
 _log = logging.getLogger(__name__)
 _SHORTEST_STEP = 1e-6
+_MEMORY = 4  # differences of Newton steps from which the next place is guessed: older ones belong to another shape
 _DAMPING = 1.0  # of a Newton step once the one before had to be shortened (Levenberg, Marquardt)
 _DAMPING_GROWTH = 3.0  # factor after each further one, and divisor after a full step
 FIRST_GAIN = 8e-3  # `StoppingRule.gain` of the first round; the next rounds lower the rest anyway
@@ -66,6 +69,24 @@ def _line_search(point: Point, direction: Array, energy: SplineEnergy) -> tuple[
     return None
 
 
+def _look_ahead(found: Point, acceleration: Acceleration, energy: SplineEnergy) -> Point | None:
+    """Return the point that the acceleration guesses, with slid parameters; None where its energy is not below `found`.
+
+    With None, the parameters of the surface are unchanged.
+    """
+    if (control := acceleration.guess()) is None:
+        return None
+    places = energy.surface.places
+    before = places.parameters, places.cube_faces
+    energy.slide(control)
+    ahead = _evaluate(control, energy)
+    if ahead.total < found.total:
+        return ahead
+    places.place(*before)
+    acceleration.forget(keep=1)
+    return None
+
+
 def _next_damping(damping: float, length: float) -> float:
     """Return a larger damping after a step that was shortened to less than half, a smaller one after a full step."""
     if length < 0.5:
@@ -109,7 +130,7 @@ def descend(energy: SplineEnergy, control: Array, rule: StoppingRule, after_step
     """
     energy.watch_facing(control)
     point = _evaluate(control, energy)
-    damping, ended = 0.0, False
+    damping, acceleration, ended = 0.0, Acceleration(_MEMORY), False
     while not ended:
         direction = energy.newton_direction(point.control, -point.gradient, damping)
         searched = _line_search(point, direction, energy)
@@ -118,9 +139,15 @@ def descend(energy: SplineEnergy, control: Array, rule: StoppingRule, after_step
             break
         found, length = searched
         damping = _next_damping(damping, length)
-        energy.slide(found.control)
-        slid = replace(found, outer=energy.surface_part(found.control))
-        after_step(slid)
-        ended = rule.ends(point.total, found.total, slid.total)
-        point = slid
+        if length < 1.0:
+            acceleration.forget()
+        else:
+            acceleration.add(point.control, found.control)
+        ahead = _look_ahead(found, acceleration, energy)
+        if ahead is None:
+            energy.slide(found.control)
+            ahead = replace(found, outer=energy.surface_part(found.control))
+        after_step(ahead)
+        ended = rule.ends(point.total, found.total, ahead.total)
+        point = ahead
     return point.control

@@ -1,4 +1,4 @@
-"""Defines the phases of a spline stage: a phase sets weights for its rounds and decides its end.
+"""Defines the phases of a spline stage: a phase sets weights for its rounds, amends their maps, and decides its end.
 
 F takes its shape or grows, and is then unfolded until it is certified; its boundary is pushed apart where it meets
 itself; the last phase restores the weight that the surface's data have lost. Rounds are counted over the whole stage,
@@ -13,6 +13,7 @@ from typing import ClassVar
 
 from .endings import Reason
 from .newton import GAIN
+from .optimized import Optimized
 from .reassignment import reassign
 from .state import State
 
@@ -25,6 +26,8 @@ FIRM_ROUNDS = 4  # after these the surface gives way at unproved spans, which mo
 GIVING_WAY = 0.25  # factor of the surface's weights there, each round: an edge in a valley cannot lie on the surface
 _CONTACT_WAY = 0.0625  # the same where the boundary meets itself: these rounds are few
 _STALLING = 8  # rounds in which the unproved spans are not halved: another start costs as much as waiting longer
+_SMOOTHING_ROUNDS = 2  # the same; F is then smoothed there, as no descent undoes some folds
+_MOST_SMOOTHED = 10  # spans that stay unproved: smoothing F near more spans would take its shape away
 
 
 @dataclass(frozen=True)
@@ -53,6 +56,10 @@ class Phase(ABC):
         """Set the weights of the data and of the anchors for the next round."""
         state.energy.anchors.release()
 
+    def amended(self, state: State, found: Optimized) -> Optimized:
+        """Return the map that a round has found, or a better map made from it."""
+        return found
+
     @abstractmethod
     def done(self, state: State) -> Reason | None:
         """Return the reason for which the phase ends; None where it continues."""
@@ -73,7 +80,7 @@ class Shape(Phase):
 
 @dataclass(frozen=True)
 class Unfold(Phase):
-    """Raise the penalty on unproved spans, and let the surface's data give way near these.
+    """Raise the penalty on unproved spans, let the surface's data give way near these, and smooth a few spans.
 
     far: a root mean square distance from the surface; a folded map that is farther away is given up in firm rounds.
     far_first: the same distance after `first` rounds of the stage, the first round in which F no longer grows.
@@ -83,6 +90,16 @@ class Unfold(Phase):
     far: float = 0.02
     far_first: float = 0.02
     first: int = 0
+
+    def amended(self, state: State, found: Optimized) -> Optimized:
+        """Smooth the map near spans that stay unproved; return the smoothed map where it has fewer unproved spans."""
+        unproved, patience = found.unproved, max(self.firm, state.halved + _SMOOTHING_ROUNDS)
+        if state.number < patience or not 0 < len(unproved) <= _MOST_SMOOTHED:
+            return found
+        control = state.energy.smoothed(found.spline.control, unproved)
+        smoothed = Optimized.of(found.spline.with_control(control))
+        _log.info("smoothed near %d spans: %d unproved", len(unproved), len(smoothed.unproved))
+        return smoothed if smoothed.faults < found.faults else found
 
     def done(self, state: State) -> Reason | None:
         """Return a reason to end with a certified map, or where more rounds would not unfold F; None before."""

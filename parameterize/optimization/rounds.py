@@ -85,6 +85,7 @@ def _round(state: State, phase: Phase, schedule: Schedule, report: "_StepReport"
     control = descend(energy, state.spline.control, rule, report)
     found = Optimized.of(state.spline.with_control(control))
     state.last_square = energy.surface.mean_square(control)
+    found = phase.amended(state, found)
     verdict, unproved = found.certificate.verdict, found.unproved
     meets = ", the boundary meets itself" if found.meets_itself else ""
     _log.info("round %d, %s: %s, %d spans unproved%s", number, phase.name, verdict, len(unproved), meets)

@@ -47,6 +47,17 @@ def _any_corner(corners: Mask) -> Mask:
     return np.asarray(np.lib.stride_tricks.sliding_window_view(corners, (2, 2, 2)).any(axis=(3, 4, 5)))
 
 
+def acting_on(spans: Mask, nets: Nets) -> Mask:
+    """Return the mask (n,) of the control points that act on marked spans (m,), on both sides of interfaces."""
+    marked = []
+    for block, counts in enumerate(nets.spans):
+        own = spans[nets.first_spans[block] : nets.first_spans[block + 1]].reshape(counts)
+        around = np.pad(own, nets.degree)
+        windows = np.lib.stride_tricks.sliding_window_view(around, (nets.degree + 1,) * 3)
+        marked.append(windows.any(axis=(3, 4, 5)).ravel())
+    return nets.merged_mask(np.concatenate(marked))
+
+
 def edge_spans(nets: Nets) -> IntArray:
     """Return the spans (k, 4) that touch one of the 12 edges of their block."""
     found = []

@@ -32,7 +32,7 @@ class State:
     unproved: int = 0  # the number of unproved spans after the last round
     unproved_before: int = 0  # the number after the round before
     fewest: int = sys.maxsize  # their number when it was last halved
-    last_square: float = 0.0  # of the last round's map
+    last_square: float = 0.0  # of the map that the last round's steps gave: smoothing leads away for a while
     rounds: Counter[str] = field(default_factory=Counter)  # done on these knots, by phase
     seconds: dict[str, float] = field(default_factory=dict)  # of these
 

@@ -82,6 +82,10 @@ class Nets:
             row[places] = (np.bincount(groups, row[places]) / sizes)[groups]
         return merged
 
+    def merged_mask(self, chosen: Mask) -> Mask:
+        """Return a mask (n,) of control points, with all those that interfaces make one with a chosen one."""
+        return np.asarray(self.merged(chosen.astype(np.float64)) > 0.0)
+
     @cached_property
     def exposed(self) -> Mask:
         """Return whether each face of each block belongs to the body's boundary, (6 blocks,)."""
