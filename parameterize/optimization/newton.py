@@ -1,8 +1,8 @@
 """Makes one round of truncated Newton steps on the energy of energy.py, and decides when the round ends.
 
 The boundary's parameters slide between steps (surface_distance.py). Alternate steps and slides converge linearly;
-acceleration.py guesses the limit, and the guess is used where its energy is lower. On twelve models it earns a hundredth
-of the distortion; without it and the smoothing of phases.py, one of nine hard surfaces ended twice as far.
+acceleration.py guesses the limit, and the guess is used where its energy is lower. On twelve models it earns 1 % of
+the distortion; without it and the smoothing of phases.py, one of nine hard surfaces ended twice as far.
 """
 
 import logging
