@@ -105,7 +105,25 @@ def state_of(control, fit=None, number=4):
     fit = (fit or surface_fit()).on_nets(NETS)
     places = fit.places.parameters, fit.places.cube_faces
     best = Optimized.of(SplineMap.on_cube(3, KNOTS, control))
-    return State(SplineEnergy(NETS, fit, Weights()), best.spline, best, places, number=number, halved=2)
+    state = State(SplineEnergy(NETS, fit, Weights()), best.spline, best, places, number=number, halved=2)
+    state.best_square = fit.mean_square(best.spline.control)
+    return state
+
+
+def test_what_a_polish_folds_is_moved_back_there_and_nowhere_else():
+    start = cube()
+    better = 1.001 * start
+    better[:, 2, 2, 2] += 0.4  # folds around the spans next to a corner
+    state = state_of(start)
+    fit = state.energy.surface
+    fit.give_way(np.full(len(fit.points), 0.8))
+    kept = Polish().amended(state, Optimized.of(SplineMap.on_cube(3, KNOTS, better)))
+    assert kept.certificate.verdict == "certified"
+    control = NETS.of_block(kept.spline.control, 0)
+    moved_back, moved = (control == start).all(axis=0), (control == better).all(axis=0)
+    assert moved_back[2, 2, 2] and moved[9:].all() and bool((moved_back | moved).all())
+    near = (fit.places.parameters < 0.2).all(axis=1)
+    assert np.all(fit.yielding[near] == 0.2) and np.median(fit.yielding) == 0.8  # a quarter near the fold
 
 
 def test_a_polish_gives_the_data_more_weight_unless_the_map_folds_again():

@@ -236,6 +236,7 @@ def test_what_was_certified_is_the_result_where_the_polish_folds_more(monkeypatc
         return folded.reshape(3, -1)
 
     monkeypatch.setattr("parameterize.optimization.rounds.descend", fold_more)
+    monkeypatch.setattr("parameterize.optimization.phases._MENDINGS", 0)
     fit = surface_fit()
     fit.give_way(np.full(len(fit.points), 1e-6))  # so that the polish has something to take back
     found, course, _ = optimise_from(start, replace(SCHEDULE, rounds=12), fit=fit)

@@ -179,6 +179,7 @@ PARTS: dict[str, Part] = {
     "smoothing": Part("smoothing near a few unproved spans", put(phases, _MOST_SMOOTHED=0), UNFOLDING),
     "parting": Part("pushing apart a boundary that meets itself", ended(phases.Separate, Reason.APART), PARTING),
     "polish": Part("giving the surface its weight back", ended(phases.Polish, Reason.LESS_POLISHED), POLISHING),
+    "moving back": Part("moving back near spans that fold again", put(phases, _MENDINGS=0), POLISHING),
     "drawn edges": Part(
         "anchors that draw edges to the surface", put(EdgeAnchors, aim=lambda anchors, _: anchors.release()), POLISHING
     ),

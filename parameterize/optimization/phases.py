@@ -11,11 +11,14 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import ClassVar
 
+import numpy as np
+
 from .endings import Reason
 from .newton import GAIN
 from .optimized import Optimized
 from .reassignment import reassign
-from .state import State
+from .spans import acting_on, with_neighbours
+from .state import MOST_WATCHED, State
 
 _log = logging.getLogger(__name__)
 
@@ -28,6 +31,7 @@ _CONTACT_WAY = 0.0625  # the same where the boundary meets itself: these rounds 
 _STALLING = 8  # rounds in which the unproved spans are not halved: another start costs as much as waiting longer
 _SMOOTHING_ROUNDS = 2  # the same; F is then smoothed there, as no descent undoes some folds
 _MOST_SMOOTHED = 10  # spans that stay unproved: smoothing F near more spans would take its shape away
+_MENDINGS = 6  # attempts to restore certified control points around spans that fold again
 
 
 @dataclass(frozen=True)
@@ -167,6 +171,31 @@ class Polish(Phase):
         if state.settled:
             energy.take_back(GIVING_WAY)
         energy.anchors.aim(state.spline.control)
+
+    def amended(self, state: State, found: Optimized) -> Optimized:
+        """Move the spans that fold again back to their certified shape; return the given map where that fails."""
+        energy, folded, mended = state.energy, found.unproved, found
+        held = np.zeros(len(energy.determinants.weights), dtype=bool)
+        for _ in range(_MENDINGS):
+            unproved = mended.unproved
+            if not 0 < len(unproved) <= MOST_WATCHED:
+                break
+            held |= with_neighbours(unproved, energy.nets)
+            back = acting_on(held, energy.nets)
+            control = np.where(back, state.best.spline.control, found.spline.control)
+            mended = Optimized.of(found.spline.with_control(control))
+        if mended is found or mended.rank > state.best.rank:
+            return found
+        places = energy.surface.places
+        before = places.parameters, places.cube_faces
+        energy.slide(mended.spline.control)
+        if energy.surface.mean_square(mended.spline.control) >= state.best_square:
+            places.place(*before)
+            return found
+        energy.determinants.activate(folded)
+        energy.give_way(folded, GIVING_WAY)
+        _log.info("moved back near %d spans", len(folded))
+        return mended
 
     def done(self, state: State) -> Reason | None:
         """Return a reason to end: all weight is restored, F folds more and more, or the rounds are used up."""

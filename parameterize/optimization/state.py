@@ -1,5 +1,6 @@
 """Holds the state of a spline stage between two rounds, and its checkpoint."""
 
+import math
 import sys
 from collections import Counter
 from dataclasses import dataclass, field
@@ -15,7 +16,7 @@ from .optimized import Optimized
 
 MOST_WATCHED = 1000  # spans: where more are unproved, the penalty at the Gauss points unfolds most first
 _CHECKPOINT = "spline"
-_NUMBERS = ("number", "certified", "unproved", "unproved_before", "fewest", "halved", "last_square")
+_NUMBERS = ("number", "certified", "unproved", "unproved_before", "fewest", "halved", "last_square", "best_square")
 
 
 @dataclass
@@ -33,6 +34,7 @@ class State:
     unproved_before: int = 0  # the number after the round before
     fewest: int = sys.maxsize  # their number when it was last halved
     last_square: float = 0.0  # of the map that the last round's steps gave: smoothing leads away for a while
+    best_square: float = math.inf
     rounds: Counter[str] = field(default_factory=Counter)  # done on these knots, by phase
     seconds: dict[str, float] = field(default_factory=dict)  # of these
 
@@ -50,6 +52,7 @@ class State:
         """Set a map, with the present parameters of the surface, as the best map."""
         places = self.energy.surface.places
         self.best, self.best_places = found, (places.parameters, places.cube_faces)
+        self.best_square = self.energy.surface.mean_square(found.spline.control)
 
     def save(self, checkpoints: Checkpoints, history: History) -> None:
         """Keep a checkpoint of the rounds, the sliding parameters, the weights and the spans that are watched."""
