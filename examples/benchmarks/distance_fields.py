@@ -17,6 +17,7 @@ Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 Triangles = tuple[Array, IntArray]  # vertices (n, 3) and faces (m, 3), wound outward
 Field = Callable[[Array], Array]  # points (n, 3) -> values (n,)
+_STEP = 1e-4  # of the differences that give a slope
 _MOVES = 4  # of Newton's method onto the surface
 _FLATTEST = 0.1  # the squared slope is at least so large: at a crease it may vanish
 
@@ -135,9 +136,8 @@ def evened(vertices: Array, faces: IntArray, count: int) -> Triangles:
 
 def on_zero(distance: Field, points: Array) -> Array:
     """Return points (n, 3) near the surface where a field is zero, moved onto it: collapses leave them beside it."""
-    step = 1e-4 * np.eye(3)
     for _ in range(_MOVES):
-        slopes = [(distance(points + axis) - distance(points - axis)) / 2e-4 for axis in step]
+        slopes = [(distance(points + axis) - distance(points - axis)) / (2.0 * _STEP) for axis in _STEP * np.eye(3)]
         slope = np.stack(slopes, axis=1)
         square = np.maximum(np.sum(slope**2, axis=1), _FLATTEST)
         points = points - (distance(points) / square)[:, None] * slope
