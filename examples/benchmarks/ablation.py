@@ -35,7 +35,7 @@ from parameterize import attempts, config
 from parameterize.files import save_text
 from parameterize.optimization import phases, rounds
 from parameterize.optimization.acceleration import Acceleration
-from parameterize.optimization.edge_attraction import EdgeAnchors
+from parameterize.optimization.anchors import Anchors
 from parameterize.optimization.endings import Reason
 from parameterize.starts import growth, network, on_cube, sharp, start
 
@@ -181,7 +181,7 @@ PARTS: dict[str, Part] = {
     "polish": Part("giving the surface its weight back", ended(phases.Polish, Reason.LESS_POLISHED), POLISHING),
     "moving back": Part("moving back near spans that fold again", put(phases, _MENDINGS=0), POLISHING),
     "drawn edges": Part(
-        "anchors that draw edges to the surface", put(EdgeAnchors, aim=lambda anchors, _: anchors.release()), POLISHING
+        "anchors that draw edges to the surface", put(Anchors, aim=lambda anchors, _: anchors.release()), POLISHING
     ),
     "Anderson": Part("Anderson's guess at the limit of the steps", put(Acceleration, guess=lambda _: None)),
 }

@@ -1,5 +1,7 @@
 """A start in the making: junctions and rods from a skeleton, made thinner where they are folded or leave the body."""
 
+from collections.abc import Iterator, Mapping
+
 import numpy as np
 
 from ..arrays import Array, Mask
@@ -12,7 +14,12 @@ from .junctions import Junction, junction
 from .rings import ring
 from .rods import Rod, ends_turned, rod
 from .room import Room
+from .row_faces import begun_at, row_face, strip_cuts
+from .rows import Row
+from .splitting import End, stub
+from .strips import Cuts
 from .tips import tip
+from .widths import FLAT
 
 _THINNER = 0.8  # a factor of sections and junctions that are folded or leave the body
 _SQUARER = 0.2  # share of a plain box by which a junction that is folded comes closer to one
@@ -34,10 +41,12 @@ class Draft:
     skeleton : Skeleton
         Of nodes with one, or three to six branches; or a circle.
     body : Body
+    rows : mapping of int to Row
+        The nodes at which limbs begin side by side.
     """
 
-    def __init__(self, skeleton: Skeleton, body: Body) -> None:
-        self._skeleton, self._body, self._room = skeleton, body, Room(skeleton, body)
+    def __init__(self, skeleton: Skeleton, body: Body, rows: Mapping[int, Row]) -> None:
+        self._skeleton, self._body, self._room, self._rows = skeleton, body, Room(skeleton, body), rows
         self._size = {node: 1.0 for node, degree in enumerate(skeleton.degrees) if degree > 2}
         self._regular = dict.fromkeys(self._size, 0.0)
         self.junctions: dict[int, Junction] = {}
@@ -101,6 +110,10 @@ class Draft:
             if not self._body.contains(corners).all():
                 thinner.add(node)
                 faults.append(("a junction leaves the body", block.center))
+        for node in self._rows:
+            if not self._body.contains(self._row_face(node)).all():
+                thinner.add(node)
+                faults.append(("the end of a flat part leaves the body", self._skeleton.nodes[node]))
         return faults
 
     def _rod_faults(self, number: int, thinner: set[int]) -> list[Fault]:
@@ -124,10 +137,12 @@ class Draft:
 
     def _lay(self, nodes: set[int]) -> None:
         """Place the junctions at some nodes by their factors, and lay the rods between their faces."""
-        for node in sorted(nodes):
+        for node in sorted(nodes.difference(self._rows)):
             self.junctions[node] = junction(self._skeleton, node, self._room, self._size[node])
-        for number, branch in enumerate(self._skeleton.branches):
-            if number in self.rods and not nodes.intersection(branch.ends):
+        in_rows = [number for row in self._rows.values() for number, _ in row.limbs]
+        for number in (*(k for k in range(len(self._skeleton.branches)) if k not in in_rows), *in_rows):
+            branch = self._skeleton.branches[number]
+            if number in self.rods and number not in in_rows and not nodes.intersection(branch.ends):
                 continue
             if branch.ends[0] == branch.ends[1] and branch.ends[0] not in self.junctions:
                 self.rods[number], self.quarters[number] = ring(branch.points, branch.radii, self._room)
@@ -139,26 +154,74 @@ class Draft:
 
     def _lay_rod(self, number: int, branch: Branch) -> None:
         first, last = (self._face(number, end) for end in (0, 1))
+        flat = FLAT
+        if branch.ends[0] in self._rows and first is not None and number != self._rows[branch.ends[0]].stem[0]:
+            branch, flat = begun_at(first, branch), 0.0  # as wide as the others beside it leave room
         total = branch.length
-        start, stop = (
-            self.junctions[node].exits[number, end].length if node in self.junctions else tip(branch, end, self._body)
-            for end, node in enumerate(branch.ends)
-        )
+        start, stop = (self._begin(number, end) for end in (0, 1))
         span = (start, total - stop)
         if last is not None:
             last = last.swapaxes(0, 1)
             if first is not None:
                 last = ends_turned(first, last, at_lengths(branch.points, np.linspace(*span, 100)))
-        self.rods[number] = rod(branch.points, branch.radii, span, first, last, self._room)
+        self.rods[number] = rod(branch.points, branch.radii, span, first, last, self._room, flat)
         self.faces[number] = (first, last)
 
+    def _begin(self, number: int, end: int) -> float:
+        """Return the length of a branch before its first section at one of its ends, negative beyond the end."""
+        branch = self._skeleton.branches[number]
+        node = branch.ends[end]
+        if node in self._rows:
+            return 0.0
+        if node in self.junctions:
+            return self.junctions[node].exits[number, end].length
+        return tip(branch, end, self._body)
+
     def _face(self, number: int, end: int) -> Array | None:
-        """Return the corners (2, 2, 3) of the face through which a branch end leaves a junction, right-handed."""
+        """Return the corners (2, 2, 3) of the face through which a branch end leaves a node, right-handed.
+
+        There is none at a tip.
+        """
         node = self._skeleton.branches[number].ends[end]
+        if node in self._rows:
+            return self._face_in_row(node, (number, end))
         if node not in self.junctions:
             return None
         name = self.junctions[node].exits[number, end].face
         return outward(face_layer(self.corners(node), name), name)
+
+    def _row_face(self, node: int) -> Array:
+        """Return the corners (2, 2, 3) of the end of a flat part where a row of limbs begins, right-handed outward."""
+        limbs = [stub(self._skeleton.branches[number], end) for number, end in self._rows[node].limbs]
+        return row_face(self._skeleton.nodes[node], limbs, self._room, self._size[node])
+
+    def _face_in_row(self, node: int, branch_end: End) -> Array:
+        """Return the face of the stem, or the part of it that one limb has."""
+        row = self._rows[node]
+        if branch_end == row.stem:
+            return self._row_face(node).swapaxes(0, 1)
+        cuts, order = self._cuts(node)
+        strip = order.index(row.limbs.index(branch_end))
+        return cuts.parts(self._laid_face(node), cuts.axis)[strip]
+
+    def _laid_face(self, node: int) -> Array:
+        """Return the last section (2, 2, 3) of a row's stem as it is laid, right-handed outward."""
+        number, end = self._rows[node].stem
+        face = self.faces[number][end]
+        assert face is not None, "a row's stem has a face"
+        return face if end else face.swapaxes(0, 1)
+
+    def strips(self) -> Iterator[tuple[int, Cuts]]:
+        """Yield the number of each row's stem, and where its block is cut into strips."""
+        for node, row in self._rows.items():
+            number, end = row.stem
+            cuts, _ = self._cuts(node)
+            yield number, cuts if end else cuts.along(1 - cuts.axis, flipped=False)
+
+    def _cuts(self, node: int) -> tuple[Cuts, list[int]]:
+        """Return where a row's stem is cut into strips, seen along the limbs, and the limb of each strip."""
+        begins = np.array([stub(self._skeleton.branches[number], end)[0] for number, end in self._rows[node].limbs])
+        return strip_cuts(self._laid_face(node), begins)
 
 
 def _is_near(point: Array, centers: Array, sections: Array) -> Mask:

@@ -19,7 +19,9 @@ from .inside import Body
 from .merging import merge
 from .rings import PARTS
 from .rods import Rod
+from .rows import with_rows
 from .splitting import split
+from .strips import Crossing, divided
 
 __all__ = ["Block", "BlockLayout", "LayoutError", "block_layout"]
 
@@ -120,21 +122,36 @@ def block_layout(
     if not skeleton.branches:
         raise LayoutError("the skeleton is a single point, without limbs or handles: one cube serves such a body")
     body = Body(vertices, faces)
-    draft = Draft(split(merge(centered(skeleton, body), body), body), body)
+    laid, rows = with_rows(merge(centered(skeleton, body), body), body)
+    draft = Draft(split(laid, body, rows), body, rows)
     for _ in range(_REPAIRS):
         faults = draft.repaired()
         if faults:
             continue
-        layout = BlockLayout.from_blocks(list(_blocks(draft, spans)))
+        layout, drafted = _layout(draft, spans)
         met = check_boundary(MultiPatch(tuple(block.spline for block in layout.blocks), layout.interfaces)).meeting
         if met is None:
             return layout
-        draft.thin_near(np.array(met.point), met.patches or ())
+        draft.thin_near(np.array(met.point), tuple(drafted[number] for number in met.patches or ()))
         faults = [("two rods meet", np.array(met.point))]
     what, place = faults[0]
     raise LayoutError(
         f"no start of blocks fits into the body: {what} near {where(place)}; make the surface wider there"
     )
+
+
+def _layout(draft: Draft, spans: int) -> tuple[BlockLayout, list[int]]:
+    """Return the layout of a draft, and the number that each block had before flat parts were cut into strips."""
+    whole = list(_blocks(draft, spans))
+    numbers = {block.name: number for number, block in enumerate(whole)}
+    begun = [(numbers[f"rod {number}"], cuts) for number, cuts in draft.strips()]
+    try:
+        blocks, drafted = divided(whole, list(_interfaces(whole)), begun)
+    except Crossing:
+        raise LayoutError(
+            "no start of blocks fits into the body: two rows of limbs share a flat part; cut the model into pieces"
+        ) from None
+    return BlockLayout.from_blocks(blocks), drafted
 
 
 def _blocks(draft: Draft, spans: int) -> Iterator[Block]:

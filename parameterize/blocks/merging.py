@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..skeleton.graph import Branch, Skeleton
+from ..skeleton.graph import Branch, Skeleton, without_lone_nodes
 from .assignment import MOST
 from .frames import at_lengths
 from .inside import Body
@@ -67,8 +67,5 @@ def _contracted(skeleton: Skeleton, number: int) -> Skeleton:
         for i, end in branch_ends(skeleton, node):
             branches[i] = led_to(branches[i], end, new, place, skeleton.nodes[node])
     del branches[number]
-    kept = np.setdiff1d(np.arange(new + 1), branch.ends)
-    numbers = {int(old): k for k, old in enumerate(kept)}
-    renumbered = (replace(one, ends=(numbers[one.ends[0]], numbers[one.ends[1]])) for one in branches)
     nodes, radii = np.concatenate([skeleton.nodes, place[None]]), np.append(skeleton.radii, radius)
-    return replace(skeleton, nodes=nodes[kept], radii=radii[kept], branches=tuple(renumbered))
+    return without_lone_nodes(replace(skeleton, nodes=nodes, radii=radii, branches=tuple(branches)))

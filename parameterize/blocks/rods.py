@@ -7,12 +7,12 @@ import numpy as np
 from ..arrays import Array
 from .frames import angle_about, arc_lengths, at_lengths, carried, tangents, turned, unit
 from .room import Room
-from .widths import THIN, half_widths
+from .widths import FLAT, THIN, half_widths
 
 _STEP = 0.7  # of the median radius: the distance of sections
 _FEWEST, _MOST = 4, 60  # sections of a branch
 _BLEND = 1.5  # times half the width of a junction's face: over which sections take that of the branch
-_SIGNS = np.array([[[-1.0, -1.0], [-1.0, 1.0]], [[1.0, -1.0], [1.0, 1.0]]])  # (2, 2, 2) of u, v at the corners [u][v]
+SIGNS = np.array([[[-1.0, -1.0], [-1.0, 1.0]], [[1.0, -1.0], [1.0, 1.0]]])  # (2, 2, 2) of u, v at the corners [u][v]
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,12 +60,18 @@ def ends_turned(first: Array, last: Array, curve: Array) -> Array:
 
 
 def rod(
-    points: Array, radii: Array, span: tuple[float, float], first: Array | None, last: Array | None, room: Room
+    points: Array,
+    radii: Array,
+    span: tuple[float, float],
+    first: Array | None,
+    last: Array | None,
+    room: Room,
+    flat: float = FLAT,
 ) -> Rod:
     """Return the sections across a curve (k, 3) between two arc lengths, which may lie beyond its ends.
 
     radii: (k,) its distances from the surface. first, last: (2, 2, 3) corners [u][v] of given faces at its ends,
-    right-handed with the curve; None at the tip of a limb.
+    right-handed with the curve; None at the tip of a limb. flat: as in `half_widths`.
     """
     radius = float(np.median(radii))
     if first is not None and last is not None and span[1] - span[0] < _reach(first) + _reach(last):
@@ -81,7 +87,7 @@ def rod(
     if first is not None and last is not None:
         turn = angle_about(along[-1], across[-1], _side(last))
         across = turned(across, along, np.linspace(0.0, turn, count))
-    offsets = plain_offsets(centers, along, across, room)
+    offsets = plain_offsets(centers, along, across, room, flat)
     for face, place in ((first, 0), (last, -1)):
         if face is not None:
             away = np.abs(lengths - lengths[place])
@@ -105,14 +111,14 @@ def _reach(face: Array) -> float:
     return _BLEND * float(np.linalg.norm(face - face.mean(axis=(0, 1)), axis=-1).max())
 
 
-def plain_offsets(centers: Array, along: Array, across: Array, room: Room) -> Array:
+def plain_offsets(centers: Array, along: Array, across: Array, room: Room, flat: float = FLAT) -> Array:
     """Return the offsets (m, 2, 2, 3) of the corners of sections as wide as the body allows."""
     beside = np.cross(along, across)
     steps = np.maximum(np.gradient(arc_lengths(centers)), 1e-300)
     curvature = np.gradient(along, axis=0) / steps[:, None]
-    half = half_widths(centers, across, beside, curvature, room)
+    half = half_widths(centers, across, beside, curvature, room, flat)
     axes = np.stack([across, beside], axis=1)
-    return np.einsum("uvd,kd,kda->kuva", _SIGNS, half, axes)
+    return np.einsum("uvd,kd,kda->kuva", SIGNS, half, axes)
 
 
 def flattest(centers: Array, along: Array, room: Room) -> Array:

@@ -1,5 +1,6 @@
 """Splits nodes whose branches one cube cannot serve into two nodes with a short branch between them."""
 
+from collections.abc import Container
 from dataclasses import replace
 from itertools import combinations
 
@@ -22,12 +23,15 @@ _ROUNDINGS = 10  # of a branch that is led to another node, where it has a kink
 End = tuple[int, int]  # the number of a branch, and 0 for its first end, 1 for its last
 
 
-def split(skeleton: Skeleton, body: Body) -> Skeleton:
-    """Return a skeleton of the same body whose nodes have at most six branches, in directions that fit a cube."""
+def split(skeleton: Skeleton, body: Body, rows: Container[int] = ()) -> Skeleton:
+    """Return a skeleton of the same body whose nodes have at most six branches, in directions that fit a cube.
+
+    rows: the nodes that stay as they are, because they get no cube.
+    """
     node = 0
     while node < len(skeleton.nodes):
         ends = branch_ends(skeleton, node)
-        group = _group(skeleton, node, ends, body) if len(ends) > 3 else ()
+        group = _group(skeleton, node, ends, body) if len(ends) > 3 and node not in rows else ()
         if group:
             skeleton = _divided(skeleton, node, ends, group, body)
         else:

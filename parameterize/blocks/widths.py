@@ -15,17 +15,18 @@ _BEND = 0.6  # of the radius of curvature: half the width at most, or sections w
 _SIGNS = np.array([[-1.0, -1.0], [-1.0, 1.0], [1.0, -1.0], [1.0, 1.0]])
 
 
-def half_widths(points: Array, across: Array, beside: Array, curvature: Array, room: Room) -> Array:
+def half_widths(points: Array, across: Array, beside: Array, curvature: Array, room: Room, flat: float = FLAT) -> Array:
     """Return half the widths (k, 2) of sections at points (k, 3) inside a body.
 
     across, beside: (k, 3) the unit vectors along the two sides of each section. curvature: (k, 3) the curvature
-    vectors of the curve. A section fits its neighbours: each width is at most the mean of theirs and its own.
+    vectors of the curve. flat: times the shorter way to the surface, so far sections reach also where another curve is
+    nearer. A section fits its neighbours: each width is at most the mean of theirs and its own.
     """
     axes = np.stack([across, beside], axis=1)  # (k, 2, 3)
     ways, own = (
         np.minimum(rays(points[:, None], axes), rays(points[:, None], -axes)) for rays in (room.body.rays, room.rays)
     )
-    half = THIN * np.minimum(ways, np.maximum(own, FLAT * ways.min(axis=1, keepdims=True)))
+    half = THIN * np.minimum(ways, np.maximum(own, flat * ways.min(axis=1, keepdims=True)))
     bends = np.abs(np.einsum("kda,ka->kd", axes, curvature))
     half = np.minimum(half, _BEND / np.maximum(bends, 1e-12))
     half = _corners_inside(points, axes, half, room)

@@ -14,11 +14,11 @@ from ..conjugate_gradients import conjugate_gradients
 from ..quality.distortion import own_boxes
 from ..spline.nets import Nets
 from ..spline.spline_map import SplineMap
+from .anchors import Anchors
 from .bending import Fairness
 from .contact import ContactPenalty, contact_penalty
 from .determinant_penalty import DeterminantPenalty
 from .distortion import Distortion
-from .edge_attraction import EdgeAnchors
 from .face_attraction import faces_towards
 from .normals import FacingPenalty, facing_penalty
 from .operators import weighted_sum
@@ -44,7 +44,7 @@ class SplineEnergy:
 
     def __init__(self, nets: Nets, surface: SurfaceFit, weights: Weights) -> None:
         self.surface, self.nets = surface, nets
-        self.anchors = EdgeAnchors(surface)
+        self.anchors = Anchors(surface)
         self._facing: FacingPenalty | None = None
         self._contact: ContactPenalty | None = None
         self._approach: SurfaceFit | None = None

@@ -57,8 +57,11 @@ class Phase(ABC):
         return self.penalties[min(number, len(self.penalties) - 1)]
 
     def begin(self, state: State) -> None:
-        """Set the weights of the data and of the anchors for the next round."""
-        state.energy.anchors.release()
+        """Set the weights of the data and of the anchors for the next round: those of several blocks always act."""
+        if state.energy.nets.one_cube:
+            state.energy.anchors.release()
+        else:
+            state.energy.anchors.aim(state.spline.control)
 
     def amended(self, state: State, found: Optimized) -> Optimized:
         """Return the map that a round has found, or a better map made from it."""
@@ -141,10 +144,8 @@ class Separate(Phase):
         energy, control = state.energy, state.spline.control
         energy.give_way(energy.watch_contact(control), _CONTACT_WAY)
         super().begin(state)
-        if not energy.nets.one_cube:
-            energy.anchors.aim(control)
-            if not state.rounds[self.name]:
-                reassign(energy.surface, control, first=True)
+        if not energy.nets.one_cube and not state.rounds[self.name]:
+            reassign(energy.surface, control, first=True)
 
     def done(self, state: State) -> Reason | None:
         """Return a reason to end when the boundary no longer meets itself, or cannot be parted near the surface."""

@@ -21,7 +21,7 @@ class SurfaceFit:
     """Compute the residuals F(p) - v and their energy.
 
     places: the parameters p. points: (N, 3), the surface points v at volume 1. quadrics: (N, 3, 3). weights: (N,), with
-    sum 1. given_corners: (8, 3), the places that the user gives for the corners of the cube; edge_attraction.py holds F
+    sum 1. given_corners: (8, 3), the places that the user gives for the corners of the cube; anchors.py holds F
     there.
     """
 

@@ -1,6 +1,6 @@
 """Defines Skeleton: the graph of centre curves of a solid, with the distance of each point from the surface."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -74,3 +74,11 @@ class Skeleton:
         """Return the number of branch ends at each node: a loop at one node counts twice."""
         ends = np.array([branch.ends for branch in self.branches], dtype=np.int64).ravel()
         return tuple(np.bincount(ends, minlength=len(self.nodes)).tolist())
+
+
+def without_lone_nodes(skeleton: Skeleton) -> Skeleton:
+    """Return a skeleton without the nodes at which no branch ends."""
+    kept = np.flatnonzero(skeleton.degrees)
+    number = {int(old): k for k, old in enumerate(kept)}
+    branches = (replace(one, ends=(number[one.ends[0]], number[one.ends[1]])) for one in skeleton.branches)
+    return replace(skeleton, nodes=skeleton.nodes[kept], radii=skeleton.radii[kept], branches=tuple(branches))

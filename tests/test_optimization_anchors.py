@@ -4,7 +4,7 @@ from block_bodies import BODIES, uniform_nets
 from shapes import ball
 
 from parameterize.cube.cube import CORNERS, EDGES, snap
-from parameterize.optimization.edge_attraction import EdgeAnchors, edge_points
+from parameterize.optimization.anchors import Anchors, edge_points
 from parameterize.optimization.sliding import SlidingParameters
 from parameterize.optimization.surface_distance import TANGENTIAL, SurfaceFit
 from parameterize.spline.bspline import greville, open_uniform_knots
@@ -26,7 +26,7 @@ def anchors_on_a_ball(radius=0.5, given_corners=None):
         vertex_weights(points, faces, len(points)),
         given_corners=given_corners,
     )
-    return EdgeAnchors(fit)
+    return Anchors(fit)
 
 
 def unit_cube():
