@@ -2,7 +2,6 @@
 
 import json
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -14,7 +13,6 @@ import parameterize.starts.blocks as starts
 from iga_nn.cli.commands import main
 from iga_nn.samples import write_obj
 from parameterize.config import preset
-from parameterize.optimization.endings import Reason
 from parameterize.run import parameterize
 from parameterize.spline.multipatch import MultiPatch
 from parameterize.surface.surface import surface_from_arrays
@@ -46,18 +44,6 @@ def test_a_ring_becomes_certified_blocks_in_its_own_units(ring, undisturbed):
     assert np.linalg.norm(found - ring.vertices, axis=1).max() < 0.01 * np.ptp(ring.vertices, axis=0).max()
     (attempt,) = undisturbed.attempts
     assert attempt.start == "blocks" and attempt.rounds["approach"] == len(starts._FACE_SHARES)
-
-
-@pytest.mark.parametrize(("certified", "back", "ending"), [
-    (False, 0.02, None),
-    (True, 0.02, Reason.SPANS_HOLLOWS),
-    (True, 0.005, Reason.CERTIFIED),
-])  # fmt: skip
-def test_certified_blocks_far_from_the_surface_make_way_for_one_cube(monkeypatch, certified, back, ending):
-    monkeypatch.setattr(starts, "distance_back", lambda *_: back)
-    state = SimpleNamespace(certified=certified, number=3, halved=3, spline=None, energy=SimpleNamespace(surface=None))
-    assert starts.UnfoldOrGiveUp(far_back=0.01).done(state) is ending
-    assert starts.UnfoldOrGiveUp().done(state) is (Reason.CERTIFIED if certified else None)  # blocks alone are possible
 
 
 @pytest.mark.slow

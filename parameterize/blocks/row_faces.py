@@ -37,7 +37,7 @@ def row_face(place: Array, limbs: Sequence[Array], room: Room, size: float) -> A
 
 
 def begun_at(face: Array, limb: Branch) -> Branch:
-    """Return a limb of a row that begins in the middle of its part (2, 2, 3) of the end of the stem, and leads outward."""
+    """Return a limb of a row that begins in the middle of its part (2, 2, 3) of the stem's end, which faces outward."""
     middle = face.mean(axis=(0, 1))
     sides = (face[1] - face[0]).mean(axis=0), (face[:, 1] - face[:, 0]).mean(axis=0)
     ahead = (limb.points - middle) @ unit(np.cross(*sides))

@@ -12,6 +12,7 @@ from scipy.spatial import cKDTree
 
 from ..arrays import Array, IntArray
 from ..skeleton.graph import Branch, Skeleton, without_lone_nodes
+from ..surface.geometry import connected
 from .frames import arc_lengths, at_lengths, tangents
 from .inside import Body
 from .splitting import End, branch_ends, stub
@@ -22,9 +23,7 @@ _ALIKE = 0.7  # the cosine of the angle between such limbs where the gap begins,
 _BACK = 1.2  # radii of the hub: how far before the gap a limb is cut
 _FEWEST = 3  # limbs of a row: one junction serves two
 _SAMPLES = np.linspace(0.05, 0.95, 10)[:, None, None]  # places between two limbs where a gap is looked for
-_LINK = (
-    1.5  # radii of the hub: between the beginnings of neighbouring limbs of a row, at most; a thumb leaves farther down
-)
+_EVEN = 1.75  # of the median distance of neighbours in a row: farther apart, they belong to different rows, as a thumb
 _LEAST = 0.1  # radii of the hub: between a limb's root and where it is cut, at least
 _STRAIGHTENINGS = 40  # of the curve that two become, where one has a kink
 _POINTS, _FEWEST_POINTS = 15, 5  # of a stem; of a limb
@@ -68,11 +67,10 @@ def with_rows(skeleton: Skeleton, body: Body) -> tuple[Skeleton, dict[int, Row]]
     """
     nodes = []
     for hub in _hubs(skeleton):
-        limbs = _limbs(skeleton, hub)
-        row = _row(limbs, float(skeleton.radii[hub].max()), body) if len(limbs) >= _FEWEST else []
-        if row:
+        while row := _row(_limbs(skeleton, hub), float(skeleton.radii[hub].max()), body):
             nodes.append(len(skeleton.nodes))
             skeleton = _with_row(skeleton, row, body)
+        skeleton = _tidied(skeleton, hub, body) if nodes else skeleton
     lone = np.flatnonzero(np.equal(skeleton.degrees, 0))
     skeleton = without_lone_nodes(skeleton)
     return skeleton, {
@@ -117,17 +115,24 @@ def _row(limbs: list[_Limb], radius: float, body: Body) -> list[tuple[_Limb, flo
 
     The list is empty where they are fewer than three. radius: that of the hub.
     """
+    if len(limbs) < _FEWEST:
+        return []
     gaps = np.array([[_gap(one, other, body) for other in limbs] for one in limbs])
     gaps = np.minimum(gaps, gaps.T)
+    np.fill_diagonal(gaps, 0.0)
     roots = np.array([limb.along[0] for limb in limbs])
     beside = gaps - np.maximum(roots[:, None], roots) > _SIDE_BY_SIDE * radius
-    np.fill_diagonal(beside, False)
-    order = _in_order(limbs, np.where(beside, gaps, 0.0).max(axis=1))
+    part = connected(np.argwhere(beside), len(limbs))
+    members = np.flatnonzero(part == np.bincount(part).argmax())
+    if len(members) < _FEWEST:
+        return []
+    order = _in_order(limbs, members, gaps[np.ix_(members, members)])
     steps = gaps[order[:-1], order[1:]]
     cuts = np.maximum(np.append(steps[:1], steps), np.append(steps, steps[-1:])) - _BACK * radius
     cuts = np.maximum(cuts, roots[order] + _LEAST * radius)
-    places = np.array([limbs[i].at(cut) for i, cut in zip(order, cuts, strict=True)]).reshape(-1, 3)
-    linked = beside[order[:-1], order[1:]] & (np.linalg.norm(np.diff(places, axis=0), axis=1) <= _LINK * radius)
+    places = np.array([limbs[i].at(cut) for i, cut in zip(order, cuts, strict=True)])
+    apart = np.linalg.norm(np.diff(places, axis=0), axis=1)
+    linked = beside[order[:-1], order[1:]] & (apart <= _EVEN * np.median(apart))
     run = max(np.split(np.arange(len(order)), np.flatnonzero(~linked) + 1), key=len)
     return [(limbs[order[k]], float(cuts[k])) for k in run] if len(run) >= _FEWEST else []
 
@@ -142,15 +147,12 @@ def _gap(one: _Limb, other: _Limb, body: Body) -> float:
     return float(one.along[last]) if alike > _ALIKE else 0.0
 
 
-def _in_order(limbs: list[_Limb], reach: Array) -> IntArray:
-    """Return the numbers of the limbs that run beside others, in the order in which they lie across the flat part.
+def _in_order(limbs: list[_Limb], members: IntArray, gaps: Array) -> IntArray:
+    """Return the numbers of some of the limbs in the order in which they lie across the flat part.
 
-    reach: (n,) the distance from the hub to which each is beside another one, 0 for none.
+    gaps: (n, n) how far from the hub the gaps between them begin.
     """
-    members = np.flatnonzero(reach)
-    if not len(members):
-        return members
-    outer = np.array([limbs[i].at(reach[i]) for i in members])
+    outer = np.array([limbs[i].at(reach) for i, reach in zip(members, gaps.max(axis=1), strict=True)])
     across = np.linalg.svd(outer - outer.mean(axis=0))[2][0]
     return np.asarray(members[np.argsort(outer @ across)])
 
@@ -170,32 +172,28 @@ def _with_row(skeleton: Skeleton, row: list[tuple[_Limb, float]], body: Body) ->
     kept = [branch for number, branch in enumerate(skeleton.branches) if number not in cut]
     kept.append(_curve((root, new), stem, body))
     nodes, radii = np.vstack([skeleton.nodes, place]), np.append(skeleton.radii, body.depths(place[None]))
-    skeleton = _tidied(replace(skeleton, nodes=nodes, radii=radii, branches=tuple(kept)), set(roots), body)
-    begun = [
-        _curve((new, tip), limb.part(distance, limb.along[-1]), body)
-        for (limb, distance), (_, tip) in zip(row, ends, strict=True)
-    ]
-    return replace(skeleton, branches=(*skeleton.branches, *begun))
+    for (limb, distance), (_, tip) in zip(row, ends, strict=True):
+        kept.append(_curve((new, tip), limb.part(distance, limb.along[-1]), body))
+    return replace(skeleton, nodes=nodes, radii=radii, branches=tuple(kept))
 
 
 def _curve(ends: tuple[int, int], points: Array, body: Body) -> Branch:
     return Branch(ends, points, body.depths(points))
 
 
-def _tidied(skeleton: Skeleton, hub: set[int], body: Body) -> Skeleton:
-    """Return the skeleton without the nodes of a hub that have no branch any more, or one, or two that are made one."""
-    for node in sorted(hub):
+def _tidied(skeleton: Skeleton, hub: IntArray, body: Body) -> Skeleton:
+    """Return the skeleton without the nodes of a hub at which one branch ends, or two, which become one."""
+    for node in (*hub.tolist(), *hub.tolist()):  # what goes at one node may leave another one with two
         ends = branch_ends(skeleton, node)
         numbers = {number for number, _ in ends}
-        if len(ends) > 2 or len(numbers) < len(ends):
-            continue
         others = [branch for number, branch in enumerate(skeleton.branches) if number not in numbers]
-        if len(ends) == 2:
+        if len(numbers) == 2 == len(ends):
             (one, first), (two, second) = ends
             curves = stub(skeleton.branches[one], first)[::-1], stub(skeleton.branches[two], second)[1:]
             far = skeleton.branches[one].ends[1 - first], skeleton.branches[two].ends[1 - second]
             others.append(_curve(far, _straightened(np.concatenate(curves)), body))
-        skeleton = replace(skeleton, branches=tuple(others))
+        if len(ends) <= 2 and len(numbers) == len(ends):
+            skeleton = replace(skeleton, branches=tuple(others))
     return skeleton
 
 

@@ -22,7 +22,6 @@ class Reason(StrEnum):
     STALLED = "stalled", "too many rounds have not halved the number of unproved spans."
     TOO_MANY_FOLDED = "too many folded spans", "more spans are folded than can be watched one by one."
     TOO_FAR = "too far from the surface", "F is folded, and not close to the surface either."
-    SPANS_HOLLOWS = "spans hollows", "det J > 0 is proved, and F is far from the surface: one cube may be closer."
     EXACT = "exact", "the blocks are the body, and nothing is left to optimise."
     LAID = "laid", "the blocks follow the outlines of the body, and are left as they are."
     OUT_OF_ROUNDS = "out of rounds", "the stage has had all its rounds."

@@ -6,7 +6,6 @@ out on them: its points take the nearest places on the blocks anew before each r
 """
 
 import logging
-import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -16,11 +15,9 @@ from ..blocks.layout import Block, BlockLayout, LayoutError
 from ..checkpoint import Checkpoints
 from ..config import Config, scaled_steps
 from ..cube.cutting import subdivide_finely
-from ..optimization.endings import Reason
 from ..optimization.phases import Polish, Schedule, Separate, Unfold
 from ..optimization.reassignment import reassign
 from ..optimization.sliding import SlidingParameters
-from ..optimization.state import State
 from ..optimization.surface_distance import TANGENTIAL, SurfaceFit
 from ..optimization.term import Weights
 from ..progress import timed
@@ -31,7 +28,7 @@ from ..surface.geometry import vertex_quadrics, vertex_weights
 from ..threads import one_blas_thread
 from .growth import STEPS, Grow
 from .on_cube import MORE_ROUNDS
-from .start import MOST_POINTS, Attempt, Start, Task, distance_back, optimized
+from .start import MOST_POINTS, Attempt, Start, Task, optimized
 
 _log = logging.getLogger(__name__)
 
@@ -43,9 +40,6 @@ _LONGEST = 0.055  # length at volume 1 above which the mesh's edges are cut: abo
 STIFF_WEIGHTS = Weights(10.0 * Weights.fairness, least_floor=0.05)
 _SOFT_ROUNDS = 4  # with the usual weights, after a stiff map is certified
 _FAR = 0.2  # root mean square distance from the surface beyond which a folded map is given up
-# The same of certified blocks' boundary, beyond which one cube is tried at once: a hand whose blocks span its slits has
-# .0094 to .0129, of which later rounds take little; Homer has .0067, which they lower to .002; a man has .0027.
-_FAR_BACK = 0.008
 
 
 @dataclass(frozen=True)
@@ -54,22 +48,6 @@ class Approach(Grow):
 
     name = "approach"
     by_faces = True
-
-
-@dataclass(frozen=True)
-class UnfoldOrGiveUp(Unfold):
-    """Unfold F, and end the rounds where it is certified and its boundary is far from the surface."""
-
-    far_back: float = math.inf
-
-    def done(self, state: State) -> Reason | None:
-        """Return the reason of any unfolding; where the boundary spans hollows, the one that says so."""
-        reason = super().done(state)
-        if reason is not Reason.CERTIFIED or math.isinf(self.far_back):
-            return reason
-        back = distance_back(state.spline, state.energy.surface)
-        _log.info("certified blocks: their boundary is %.4f from the surface", back)
-        return Reason.SPANS_HOLLOWS if back > self.far_back else reason
 
 
 @dataclass(frozen=True)
@@ -91,8 +69,7 @@ class AlongSkeleton(Start):
                 _log.warning("%s", error)
                 return None
             fit = surface_fit(task, first)
-        rounds = schedule(task.config, far_back=math.inf if needed else _FAR_BACK)
-        stiff = optimized(first, fit, rounds, task, checkpoints, STIFF_WEIGHTS)
+        stiff = optimized(first, fit, schedule(task.config), task, checkpoints, STIFF_WEIGHTS)
         return softened(stiff, task, checkpoints)
 
 
@@ -101,7 +78,7 @@ BLOCKS = AlongSkeleton("blocks", "blocks", "laying blocks along the skeleton")
 
 def softened(stiff: Attempt, task: Task, checkpoints: Checkpoints) -> Attempt:
     """Return what rounds with the usual weights make of a stiff map, or that map where they make it worse."""
-    if any(stiff.found.faults) or stiff.course.ending is Reason.SPANS_HOLLOWS:
+    if any(stiff.found.faults):
         return stiff
     spline = stiff.found.spline
     rounds = Schedule((Polish(),), _SOFT_ROUNDS, _USUAL_STEPS)
@@ -114,18 +91,16 @@ def schedule(
     config: Config,
     face_shares: tuple[float, ...] = _FACE_SHARES,
     point_shares: tuple[float, ...] = _POINT_SHARES,
-    far_back: float = math.inf,
 ) -> Schedule:
     """Return the phases of the rounds: all faces are drawn to the surface at first, then the surface's points draw F.
 
     Both do so with a growing weight, whose shares are given round by round.
 
-    Folded maps are not given up for their distance: places are assigned anew in each round. far_back: the distance of
-    the boundary from the surface beyond which certified ones are given up.
+    Folded maps are not given up for their distance: places are assigned anew in each round.
     """
     shares, steps = face_shares + point_shares, scaled_steps(STEPS, config.steps_factor)
     growing = Approach(shares=face_shares, steps=steps), Grow(shares=shares, steps=steps)
-    phases = *growing, UnfoldOrGiveUp(far=_FAR, far_first=_FAR, far_back=far_back), Separate(far=_FAR), Polish()
+    phases = *growing, Unfold(far=_FAR, far_first=_FAR), Separate(far=_FAR), Polish()
     return Schedule(phases, len(shares) + config.spline.rounds + MORE_ROUNDS, (steps,) * len(shares) + _USUAL_STEPS)
 
 

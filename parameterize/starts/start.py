@@ -248,19 +248,14 @@ class Attempt:
 
         It is large where the map spans a hollow of the surface, whose points are not far from it.
         """
-        return distance_back(self.found.spline, self.fit)
+        samples = boundary_samples(self.found.spline, _A_SPAN)
+        squares = igl.point_mesh_squared_distance(samples.points, self.fit.points, self.fit.places.triangles)[0]
+        return math.sqrt(np.average(squares, weights=samples.areas))
 
     @property
     def rank(self) -> tuple[int, bool, bool, float]:
         """Return the faults of the map, then its distance: of two attempts the one with the lower rank is better."""
         return *self.found.rank, self.distance
-
-
-def distance_back(spline: SplineMap, fit: SurfaceFit) -> float:
-    """Return the root mean square distance of a map's boundary from the surface, at volume 1."""
-    samples = boundary_samples(spline, _A_SPAN)
-    squares = igl.point_mesh_squared_distance(samples.points, fit.points, fit.places.triangles)[0]
-    return math.sqrt(np.average(squares, weights=samples.areas))
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,96 @@
+"""Limbs that leave a flat part side by side begin in a row, and the blocks of the flat part are cut into strips."""
+
+from collections import Counter
+
+import numpy as np
+import pytest
+from test_blocks_layout_automatic import GRAPHS
+from thick_graphs import curve, exposed_genus, thick
+
+from parameterize.blocks.inside import Body
+from parameterize.blocks.layout import LayoutError, block_layout
+from parameterize.blocks.rows import with_rows
+from parameterize.certificate.body import certify
+from parameterize.certificate.boundary import check_boundary
+from parameterize.spline.multipatch import MultiPatch
+
+X, Y, Z = np.eye(3)
+
+
+def finger(lateral, side=1.0):
+    """From the origin into the flat part, side by side with the others there, and away from them."""
+    bend, knuckle = np.array([0.3 * side, 0.9 * lateral, 0.0]), np.array([0.9 * side, 1.2 * lateral, 0.0])
+    tip = np.array([1.9 * side, 2.6 * lateral, 0.0])
+    return np.concatenate([curve(0 * X, bend)[:-1], curve(bend, knuckle)[:-1], curve(knuckle, tip)])
+
+
+LATERAL = (-0.42, -0.14, 0.14, 0.42)
+ARM, THUMB = curve(0 * X, -1.2 * X), curve(0 * X, [0.2, -1.1, 0.0])
+
+
+def hand(*others, fingers=LATERAL):
+    """A palm with fingers, and what else begins in its middle."""
+    curves = [*map(finger, fingers), *others]
+    return thick(
+        [0 * X, *(path[-1] for path in curves)], [(0, k, path) for k, path in enumerate(curves, start=1)], cells=70
+    )
+
+
+def rows_of(skeleton, vertices, faces):
+    return with_rows(skeleton, Body(vertices, faces))
+
+
+@pytest.mark.parametrize("others", [(ARM,), (ARM, THUMB)], ids=["arm", "arm_and_thumb"])
+def test_fingers_begin_in_a_row_before_the_gaps(others):
+    found, rows = rows_of(*hand(*others))
+    ((node, row),) = rows.items()
+    begins = np.array([found.branches[number].points[0] for number, _ in row.limbs])
+    assert np.all(np.abs(begins[:, 0] - 0.9) < 0.4)  # the tubes part at a distance of .4: about there
+    laterals = begins[:, 1] * np.sign(begins[-1, 1])
+    assert np.all(np.diff(laterals) > 0.2)
+    assert np.allclose(found.nodes[node], begins.mean(axis=0))
+    stem, end = row.stem
+    assert np.array_equal(found.branches[stem].points[-1 if end else 0], found.nodes[node])
+    tips = len(others) + len(LATERAL)
+    assert sorted(found.degrees) == [1] * tips + [5] if len(others) == 1 else [1] * tips + [3, 5]
+    assert found.handles == 0
+
+
+@pytest.mark.parametrize("name", ["three limbs", "two legs", "five limbs", "six limbs", "eight limbs", "frame"])
+def test_limbs_that_part_at_once_have_no_row(name):
+    skeleton, vertices, faces = thick(*GRAPHS[name], cells=60)
+    found, rows = rows_of(skeleton, vertices, faces)
+    assert not rows and [one.ends for one in found.branches] == [one.ends for one in skeleton.branches]
+
+
+@pytest.mark.parametrize("others", [(ARM,), (ARM, THUMB)], ids=["arm", "arm_and_thumb"])
+def test_the_flat_part_is_cut_into_a_strip_for_each_finger(others):
+    skeleton, vertices, faces = hand(*others)
+    layout = block_layout(skeleton, vertices, faces)
+    body = MultiPatch(tuple(block.spline for block in layout.blocks), layout.interfaces)
+    certificate = certify(body)
+    assert certificate.verdict == "certified" and not any(patch.left_handed for patch in certificate.patches)
+    assert check_boundary(body).injective
+    assert Body(vertices, faces).contains(layout.corners).all()
+    assert exposed_genus(layout) == 0 and len(body.parts) == 1
+    strips = Counter(block.name.partition(", strip")[0] for block in layout.blocks)
+    assert set(strips.values()) <= {1, len(LATERAL)} and len(LATERAL) in strips.values()
+    fingers = [number for number, block in enumerate(layout.blocks) if block.points(np.array([0.5, 0.5, 1.0]))[0] > 1.5]
+    neighbours = {
+        q
+        for one in layout.interfaces
+        for p, q in ((one.first[0], one.second[0]), (one.second[0], one.first[0]))
+        if p in fingers
+    }
+    assert len(fingers) == len(LATERAL) == len(neighbours)  # each on a strip of its own
+
+
+def test_two_rows_cannot_share_a_flat_part():
+    left = [finger(lateral, side=-1.0) for lateral in (-0.3, 0.0, 0.3)]
+    hubs = np.array([0 * X, -0.4 * X])
+    edges = [(0, k + 2, path) for k, path in enumerate(map(finger, LATERAL))]
+    edges += [(1, k + 6, path - 0.4 * X) for k, path in enumerate(left)]
+    edges.append((0, 1, curve(*hubs)))
+    skeleton, vertices, faces = thick([*hubs, *(path[-1] for _, _, path in edges[:-1])], edges, cells=80)
+    with pytest.raises(LayoutError, match="two rows of limbs share a flat part"):
+        block_layout(skeleton, vertices, faces)
