@@ -4,7 +4,7 @@ from block_bodies import BODIES, uniform_nets
 from shapes import ball
 
 from parameterize.cube.cube import CORNERS, EDGES, snap
-from parameterize.optimization.anchors import Anchors, edge_points
+from parameterize.optimization.anchors import Anchors, edge_points, face_points
 from parameterize.optimization.sliding import SlidingParameters
 from parameterize.optimization.surface_distance import TANGENTIAL, SurfaceFit
 from parameterize.spline.bspline import greville, open_uniform_knots
@@ -102,3 +102,19 @@ def test_a_block_whose_faces_are_all_glued_has_no_edge_points():
     nets = uniform_nets(*[(2, 2, 2)] * 7, interfaces=around)
     _, faces = edge_points(nets)
     assert set(faces // 6) == set(range(1, 7))
+
+
+@pytest.mark.parametrize("name", BODIES)
+def test_blocks_have_anchors_inside_all_exposed_faces(name):
+    spline = BODIES[name](7)
+    nets = spline.nets
+    points, faces = face_points(nets)
+    assert set(faces) == set(np.flatnonzero(nets.exposed))
+    assert (points[np.arange(len(points)), faces % 6 // 2] == faces % 2).all()
+    assert ((points > 0.0) & (points < 1.0)).sum(axis=1).tolist() == [2] * len(points)
+    for face in set(faces):
+        inner = [
+            len(np.unique(row)) - 2
+            for row in np.delete(np.array(nets.knots[face // 6], dtype=object), face % 6 // 2, axis=0)
+        ]
+        assert (faces == face).sum() == np.prod(inner)
