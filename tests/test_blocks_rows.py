@@ -7,9 +7,11 @@ import pytest
 from test_blocks_layout_automatic import GRAPHS
 from thick_graphs import curve, exposed_genus, thick
 
+from parameterize.blocks import layout as layouts
 from parameterize.blocks.inside import Body
-from parameterize.blocks.layout import LayoutError, block_layout
+from parameterize.blocks.layout import Block, BlockLayout, block_layout
 from parameterize.blocks.rows import with_rows
+from parameterize.blocks.strips import Crossing, Cuts, divided
 from parameterize.certificate.body import certify
 from parameterize.certificate.boundary import check_boundary
 from parameterize.spline.multipatch import MultiPatch
@@ -85,12 +87,42 @@ def test_the_flat_part_is_cut_into_a_strip_for_each_finger(others):
     assert len(fingers) == len(LATERAL) == len(neighbours)  # each on a strip of its own
 
 
-def test_two_rows_cannot_share_a_flat_part():
-    left = [finger(lateral, side=-1.0) for lateral in (-0.3, 0.0, 0.3)]
-    hubs = np.array([0 * X, -0.4 * X])
-    edges = [(0, k + 2, path) for k, path in enumerate(map(finger, LATERAL))]
-    edges += [(1, k + 6, path - 0.4 * X) for k, path in enumerate(left)]
-    edges.append((0, 1, curve(*hubs)))
-    skeleton, vertices, faces = thick([*hubs, *(path[-1] for _, _, path in edges[:-1])], edges, cells=80)
-    with pytest.raises(LayoutError, match="two rows of limbs share a flat part"):
-        block_layout(skeleton, vertices, faces)
+def test_limbs_are_laid_without_a_row_where_its_strips_do_not_fit(monkeypatch):
+    def cross(whole, interfaces, begun):
+        if list(begun):
+            raise Crossing
+        return whole, list(range(len(whole)))
+
+    graph = GRAPHS["hand"]  # which has blocks without a row, too
+    skeleton, vertices, faces = thick(*graph, cells=60)
+    assert any("strip" in block.name for block in block_layout(skeleton, vertices, faces).blocks)
+    monkeypatch.setattr(layouts, "divided", cross)
+    assert not any("strip" in block.name for block in block_layout(skeleton, vertices, faces).blocks)
+
+
+def chain_of_cubes():
+    """Three unit cubes in a row along x; the last one is turned about x by a right angle."""
+    cube = np.stack(np.meshgrid(*[[0.0, 1.0]] * 3, indexing="ij"), axis=-1).transpose(2, 0, 1, 3)  # [w][u][v]
+    turned = np.stack([cube[..., 0] + 2.0, 1.0 - cube[..., 2], cube[..., 1]], axis=-1)
+    return [Block(str(k), one, (2, 2, 2)) for k, one in enumerate((cube, cube + X, turned))]
+
+
+def test_strips_go_on_through_glued_faces_and_turn_with_them():
+    blocks = chain_of_cubes()
+    interfaces = BlockLayout.from_blocks(blocks).interfaces
+    cuts = Cuts(1, np.array([[0.75, 0.25]]))  # across y, at a quarter
+    strips, parents = divided(blocks, interfaces, [(0, cuts)])
+    assert parents == [0, 0, 1, 1, 2, 2]
+    assert [sorted({float(y) for y in strip.sections[..., 1].ravel()}) for strip in strips[:4]] == [
+        [0.0, 0.25],
+        [0.25, 1.0],
+    ] * 2
+    assert len(BlockLayout.from_blocks(strips).interfaces) == 4 + 3  # two along x for each strip, one between the two
+    with pytest.raises(Crossing):
+        divided(blocks, interfaces, [(0, cuts), (1, Cuts(2, np.array([[0.5, 0.5]])))])
+
+
+def test_a_block_that_nothing_reaches_stays_whole():
+    blocks = chain_of_cubes()
+    strips, _ = divided(blocks, BlockLayout.from_blocks(blocks).interfaces, [(0, Cuts(0, np.array([[0.5, 0.5]])))])
+    assert [block.name for block in strips] == ["0, strip 0", "0, strip 1", "1", "2"]

@@ -32,8 +32,9 @@ from iga_nn.options import MapOptions, WorkerOptions
 from iga_nn.report import document as reports
 from iga_nn.workflow.worker_run import Ended
 from parameterize import attempts, config
+from parameterize.blocks import layout
 from parameterize.files import save_text
-from parameterize.optimization import phases, rounds
+from parameterize.optimization import anchors, phases, rounds
 from parameterize.optimization.acceleration import Acceleration
 from parameterize.optimization.anchors import Anchors
 from parameterize.optimization.endings import Reason
@@ -148,6 +149,7 @@ def raised_floors() -> None:
 STIFFER = ("stiff growth", "last growth")
 ON_CUBE = ("growth", *STIFFER)  # these start from the surface on a sphere, and then on the cube
 GROWN, ON_SPHERE = starts_with("growth", *STIFFER), starts_with(*ON_CUBE)
+IN_BLOCKS = starts_with("blocks")
 UNFOLDING, PARTING, POLISHING = has_phase("unfold", 1), has_phase("separate"), has_phase("polish")
 PARTS: dict[str, Part] = {
     "network": Part("the trained network: every map is grown", train(easy_loss=0.0), trained),
@@ -156,7 +158,13 @@ PARTS: dict[str, Part] = {
     "stiff growth": without_start("stiff growth"),
     "last growth": without_start("last growth"),
     "sharp edges": Part("the start along sharp edges", put(start.Task, ridges=None), starts_with("sharp edges")),
-    "blocks": Part("blocks along limbs", fast(lambda options: replace(options, blocks=1)), starts_with("blocks")),
+    "blocks": Part("blocks along limbs", fast(lambda options: replace(options, blocks=1)), IN_BLOCKS),
+    "rows": Part("rows of limbs side by side", put(layout, with_rows=lambda skeleton, _: (skeleton, {})), IN_BLOCKS),
+    "anchored faces": Part(
+        "anchors inside the faces of blocks",
+        put(anchors, face_points=lambda _: (np.empty((0, 3)), np.empty(0, dtype=np.int64)), _FACES=anchors._EDGES),
+        IN_BLOCKS,
+    ),
     "race": Part("the race between two turns of the cube", train(race=0.0), trained),
     "whitening": Part("the affine map before the network", train(whiten=False), starts_with("network")),
     "muon": Part("Muon: Adam trains all", train(matrix_rate=0.0), starts_with("network")),
@@ -181,7 +189,7 @@ PARTS: dict[str, Part] = {
     "polish": Part("giving the surface its weight back", ended(phases.Polish, Reason.LESS_POLISHED), POLISHING),
     "moving back": Part("moving back near spans that fold again", put(phases, _MENDINGS=0), POLISHING),
     "drawn edges": Part(
-        "anchors that draw edges to the surface", put(Anchors, aim=lambda anchors, _: anchors.release()), POLISHING
+        "anchors that draw edges to the surface", put(Anchors, aim=lambda own, _: own.release()), POLISHING
     ),
     "Anderson": Part("Anderson's guess at the limit of the steps", put(Acceleration, guess=lambda _: None)),
 }

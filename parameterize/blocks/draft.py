@@ -47,6 +47,7 @@ class Draft:
 
     def __init__(self, skeleton: Skeleton, body: Body, rows: Mapping[int, Row]) -> None:
         self._skeleton, self._body, self._room, self._rows = skeleton, body, Room(skeleton, body), rows
+        self._in_rows = {number for row in rows.values() for number, _ in row.limbs}
         self._size = {node: 1.0 for node, degree in enumerate(skeleton.degrees) if degree > 2}
         self._regular = dict.fromkeys(self._size, 0.0)
         self.junctions: dict[int, Junction] = {}
@@ -139,10 +140,9 @@ class Draft:
         """Place the junctions at some nodes by their factors, and lay the rods between their faces."""
         for node in sorted(nodes.difference(self._rows)):
             self.junctions[node] = junction(self._skeleton, node, self._room, self._size[node])
-        in_rows = [number for row in self._rows.values() for number, _ in row.limbs]
-        for number in (*(k for k in range(len(self._skeleton.branches)) if k not in in_rows), *in_rows):
+        for number in sorted(range(len(self._skeleton.branches)), key=self._in_rows.__contains__):  # after their stems
             branch = self._skeleton.branches[number]
-            if number in self.rods and number not in in_rows and not nodes.intersection(branch.ends):
+            if number in self.rods and number not in self._in_rows and not nodes.intersection(branch.ends):
                 continue
             if branch.ends[0] == branch.ends[1] and branch.ends[0] not in self.junctions:
                 self.rods[number], self.quarters[number] = ring(branch.points, branch.radii, self._room)
@@ -155,7 +155,7 @@ class Draft:
     def _lay_rod(self, number: int, branch: Branch) -> None:
         first, last = (self._face(number, end) for end in (0, 1))
         flat = FLAT
-        if branch.ends[0] in self._rows and first is not None and number != self._rows[branch.ends[0]].stem[0]:
+        if number in self._in_rows and first is not None:
             branch, flat = begun_at(first, branch), 0.0  # as wide as the others beside it leave room
         total = branch.length
         start, stop = (self._begin(number, end) for end in (0, 1))

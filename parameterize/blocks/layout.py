@@ -1,6 +1,7 @@
 """Defines BlockLayout: blocks glued by whole faces, a thin start inside a body with handles or limbs."""
 
-from collections.abc import Callable, Iterator, Sequence
+import logging
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -19,9 +20,11 @@ from .inside import Body
 from .merging import merge
 from .rings import PARTS
 from .rods import Rod
-from .rows import with_rows
+from .rows import Row, with_rows
 from .splitting import split
 from .strips import Crossing, divided
+
+_log = logging.getLogger(__name__)
 
 __all__ = ["Block", "BlockLayout", "LayoutError", "block_layout"]
 
@@ -122,8 +125,21 @@ def block_layout(
     if not skeleton.branches:
         raise LayoutError("the skeleton is a single point, without limbs or handles: one cube serves such a body")
     body = Body(vertices, faces)
-    laid, rows = with_rows(merge(centered(skeleton, body), body), body)
-    draft = Draft(split(laid, body, rows), body, rows)
+    merged = merge(centered(skeleton, body), body)
+    in_rows, rows = with_rows(merged, body)
+    if rows:
+        try:
+            return _laid(in_rows, rows, body, spans, where)
+        except LayoutError as error:
+            _log.info("without rows of limbs: %s", error)
+    return _laid(merged, {}, body, spans, where)
+
+
+def _laid(
+    skeleton: Skeleton, rows: Mapping[int, Row], body: Body, spans: int, where: Callable[[Array], str]
+) -> BlockLayout:
+    """Return the start of blocks along a skeleton with some rows of limbs."""
+    draft = Draft(split(skeleton, body, rows), body, rows)
     for _ in range(_REPAIRS):
         faults = draft.repaired()
         if faults:
@@ -148,9 +164,7 @@ def _layout(draft: Draft, spans: int) -> tuple[BlockLayout, list[int]]:
     try:
         blocks, drafted = divided(whole, list(_interfaces(whole)), begun)
     except Crossing:
-        raise LayoutError(
-            "no start of blocks fits into the body: two rows of limbs share a flat part; cut the model into pieces"
-        ) from None
+        raise LayoutError("no start of blocks fits into the body: two rows of limbs share a flat part") from None
     return BlockLayout.from_blocks(blocks), drafted
 
 

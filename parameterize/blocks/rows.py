@@ -71,11 +71,9 @@ def with_rows(skeleton: Skeleton, body: Body) -> tuple[Skeleton, dict[int, Row]]
             nodes.append(len(skeleton.nodes))
             skeleton = _with_row(skeleton, row, body)
         skeleton = _tidied(skeleton, hub, body) if nodes else skeleton
-    lone = np.flatnonzero(np.equal(skeleton.degrees, 0))
+    numbers = np.searchsorted(np.flatnonzero(skeleton.degrees), nodes).tolist()
     skeleton = without_lone_nodes(skeleton)
-    return skeleton, {
-        node: _row_at(skeleton, node) for node in (np.array(nodes) - np.searchsorted(lone, nodes)).tolist()
-    }
+    return skeleton, {node: _row_at(skeleton, node) for node in numbers}
 
 
 def _row_at(skeleton: Skeleton, node: int) -> Row:
