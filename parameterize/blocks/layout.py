@@ -127,6 +127,8 @@ def block_layout(
     body = Body(vertices, faces)
     merged = merge(centered(skeleton, body), body)
     in_rows, rows = with_rows(merged, body)
+    for row in rows.values():
+        _log.info("%d limbs side by side: a row, and a strip of the flat part for each", len(row.limbs))
     if rows:
         try:
             return _laid(in_rows, rows, body, spans, where)

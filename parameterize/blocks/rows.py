@@ -17,7 +17,7 @@ from .frames import arc_lengths, at_lengths, tangents
 from .inside import Body
 from .splitting import End, branch_ends, stub
 
-_NEAR = 3.0  # radii of the thicker node: junctions that are nearer are taken as one hub
+_NEAR = 5.0  # radii of the thicker node: junctions that are nearer are taken as one hub
 _SIDE_BY_SIDE = 1.5  # radii of the hub: limbs of a row run on so far before a gap is between them
 _ALIKE = 0.7  # the cosine of the angle between such limbs where the gap begins, at least
 _BACK = 1.2  # radii of the hub: how far before the gap a limb is cut
