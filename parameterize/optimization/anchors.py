@@ -7,8 +7,9 @@ the anchors would hold F at that part: they are aimed in the last rounds alone, 
 first rounds they earned nothing on twelve models (ARAP and distance 1.00 times without them).
 
 Several blocks start as a skeleton of the solid, so a face may lie in a crease between two others, where no point of the
-surface is near: nothing but anchors on the faces draws it out. A hand ended 33 times as far from its surface without
-them, most of it in two such creases. The faces of one cube have points of the surface everywhere.
+surface is near: nothing but anchors on the faces draws it out. Without them the boundary of a hand's blocks met itself,
+and before its palm was cut into strips another hand ended 33 times as far from its surface, most of it in two creases.
+The faces of one cube have points of the surface everywhere.
 
 Corners that the user
 gives are held until the map is certified; in the last rounds they may move a little, because the boundary crosses
