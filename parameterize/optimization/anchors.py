@@ -3,17 +3,17 @@
 The edges of the cube may have no parameter of a vertex of the mesh. F keeps a small crease along these edges, and
 without anchors it could leave the surface there, most of all at the eight corners, and inflate the elements. Anchors
 suit a map that is nearly on the surface: on a rough map the nearest points belong to another part of the surface, and
-the anchors would hold F at that part: they are aimed in the last rounds alone, and where blocks are parted. In the
-first rounds they earned nothing on twelve models (ARAP and distance 1.00 times without them).
+the anchors would hold F at that part: those of one cube are aimed in the last rounds alone. In the first rounds they
+earned nothing on twelve models (ARAP and distance 1.00 times without them).
 
-Several blocks start as a skeleton of the solid, so a face may lie in a crease between two others, where no point of the
-surface is near: nothing but anchors on the faces draws it out. Without them the boundary of a hand's blocks met itself,
-and before its palm was cut into strips another hand ended 33 times as far from its surface, most of it in two creases.
+Several blocks, whose anchors always act, start as a skeleton of the solid, so a face may lie in a crease between two
+others, where no point of the surface is near: nothing but anchors on the faces draws it out. Without them the boundary
+of a hand's blocks met itself, and before its palm was cut into strips another hand ended 33 times as far from its
+surface, most of it in two creases.
 The faces of one cube have points of the surface everywhere.
 
-Corners that the user
-gives are held until the map is certified; in the last rounds they may move a little, because the boundary crosses
-itself beside corners that are held to the end.
+Corners that the user gives are held until the map is certified; in the last rounds they may move a little, because the
+boundary crosses itself beside corners that are held to the end.
 """
 
 import numpy as np
