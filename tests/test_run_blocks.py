@@ -58,7 +58,7 @@ def test_interrupted_and_resumed_gives_the_same_blocks(ring, options, undisturbe
     resumed = parameterize(
         ring, checkpoint_dir=tmp_path, resume=True, progress=lambda state: steps.append(state.step), **options
     )
-    assert min(steps) > 2 * options["config"].spline.steps  # it went on
+    assert steps[0] > 2 * options["config"].spline.steps  # it went on; the soft rounds count from one again
     for one, other in zip(undisturbed.volume, resumed.volume, strict=True):
         assert np.array_equal(one.control_points, other.control_points)
 

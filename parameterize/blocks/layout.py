@@ -160,11 +160,13 @@ def _laid(
 
 def _layout(draft: Draft, spans: int) -> tuple[BlockLayout, list[int]]:
     """Return the layout of a draft, and the number that each block had before flat parts were cut into strips."""
-    whole = list(_blocks(draft, spans))
-    numbers = {block.name: number for number, block in enumerate(whole)}
+    whole = BlockLayout.from_blocks(list(_blocks(draft, spans)))
+    numbers = {block.name: number for number, block in enumerate(whole.blocks)}
     begun = [(numbers[f"rod {number}"], cuts) for number, cuts in draft.strips()]
+    if not begun:
+        return whole, list(range(len(whole)))
     try:
-        blocks, drafted = divided(whole, list(_interfaces(whole)), begun)
+        blocks, drafted = divided(whole.blocks, whole.interfaces, begun)
     except Crossing:
         raise LayoutError("no start of blocks fits into the body: two rows of limbs share a flat part") from None
     return BlockLayout.from_blocks(blocks), drafted
