@@ -228,6 +228,14 @@ def export(
     return target
 
 
+def load_field(path: Path, body: Body) -> Solved:
+    """Return the field of solution.npz on a body of one patch or several.
+
+    Raises ValueError or OSError for a file that holds none for so many.
+    """
+    return MultiPatchField.load(path) if isinstance(body, MultiPatch) else SplineField.load(path)
+
+
 def _load_solution(path: Path, body: Body) -> tuple[Solved, BoundaryValueProblem | None]:
     """Return a solution and the problem in the report beside it, None for a problem that is not known.
 
@@ -235,7 +243,7 @@ def _load_solution(path: Path, body: Body) -> tuple[Solved, BoundaryValueProblem
     """
     several = as_multipatch(body)
     with input_errors():
-        found: Solved = MultiPatchField.load(path) if isinstance(body, MultiPatch) else SplineField.load(path)
+        found = load_field(path, body)
     fields = fields_on(found)
     if any(field.coefficients.shape[3:] not in ((), (3,)) for field in fields):
         raise InputError(f"{path}: coefficients must have shape (m_u, m_v, m_w) or (.., 3)")
