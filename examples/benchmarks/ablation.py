@@ -252,6 +252,7 @@ def main(argv: list[str] | None = None) -> int:
 
 
 MAPPING = MapOptions(device="cpu", resume=True)
+FIRST, LATER_FIRST = 120, 40  # the hard surfaces begin here: the tables of the stress set have these, too
 
 
 def _options(argv: list[str] | None) -> Options:
@@ -278,8 +279,8 @@ def _options(argv: list[str] | None) -> Options:
 
 
 def _numbers(kind: str, count: int) -> list[int]:
-    """The first numbers of a kind from 40 on, or from LATER."""
-    first = 40 if any(kind_of(number) == kind for number in range(LATER)) else LATER
+    """The first numbers of a kind from FIRST on, or from LATER + LATER_FIRST on."""
+    first = FIRST if any(kind_of(number) == kind for number in range(LATER)) else LATER + LATER_FIRST
     return [number for number in range(first, first + LATER) if kind_of(number) == kind][:count]
 
 
