@@ -67,7 +67,7 @@ def test_a_process_that_fails_alone_says_why(monkeypatch, capsys):
     assert capsys.readouterr().err == "iga-nn: process 1 of 2 failed, the job ends: MemoryError\n"
 
 
-@pytest.mark.parametrize("how", ["die", "raise"])
+@pytest.mark.parametrize("how", ["raise", pytest.param("die", marks=pytest.mark.slow)])
 def test_a_process_that_fails_ends_the_job(how, folder):
     done = mpiexec(2, *SOLVE, "--out", "out", cwd=folder, IGA_NN_FAIL=how)
     assert done.returncode != 0

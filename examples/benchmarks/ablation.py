@@ -38,6 +38,9 @@ from parameterize.optimization import anchors, phases, rounds
 from parameterize.optimization.acceleration import Acceleration
 from parameterize.optimization.anchors import Anchors
 from parameterize.optimization.endings import Reason
+from parameterize.optimization.energy import SplineEnergy
+from parameterize.optimization.sliding import SlidingParameters
+from parameterize.starts import blocks as starts_blocks
 from parameterize.starts import growth, network, on_cube, sharp, start
 
 WHOLE = "nothing"  # is left out
@@ -165,6 +168,12 @@ PARTS: dict[str, Part] = {
         put(anchors, face_points=lambda _: (np.empty((0, 3)), np.empty(0, dtype=np.int64)), _FACES=anchors._EDGES),
         IN_BLOCKS,
     ),
+    "soft rounds": Part(
+        "the last rounds of blocks, with the usual weights",
+        put(starts_blocks, softened=lambda stiff, *_: stiff),
+        IN_BLOCKS,
+    ),
+    "merging": Part("merging of near junctions", put(layout, merge=lambda skeleton, _: skeleton), IN_BLOCKS),
     "race": Part("the race between two turns of the cube", train(race=0.0), trained),
     "whitening": Part("the affine map before the network", train(whiten=False), starts_with("network")),
     "muon": Part("Muon: Adam trains all", train(matrix_rate=0.0), starts_with("network")),
@@ -191,6 +200,8 @@ PARTS: dict[str, Part] = {
     "drawn edges": Part(
         "anchors that draw edges to the surface", put(Anchors, aim=lambda own, _: own.release()), POLISHING
     ),
+    "facing": Part("the penalty on normals that do not agree", put(SplineEnergy, watch_facing=lambda *_: None)),
+    "relaxing": Part("untangling of the layout after each step", put(SlidingParameters, relax=lambda *_: None)),
     "Anderson": Part("Anderson's guess at the limit of the steps", put(Acceleration, guess=lambda _: None)),
 }
 
