@@ -2,7 +2,7 @@
 
 The boundary's parameters slide between steps (surface_distance.py). Alternate steps and slides converge linearly;
 acceleration.py guesses the limit, and the guess is used where its energy is lower. On twelve models it earns 1 % of
-the distortion; without it and the smoothing of phases.py, one of nine hard surfaces ended 1.3 times as far.
+the distortion; without it one of twelve hard surfaces, a bulb, stays folded.
 """
 
 import logging
