@@ -37,7 +37,7 @@ docs: $(DEV)
 	OMP_NUM_THREADS=1 $(BIN)/python -P -m sphinx -W --keep-going -b html docs docs/_build/html
 
 test: lint
-	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n 3 --dist loadfile --no-loadscope-reorder
+	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder
 
 lint: $(DEV)
 	$(BIN)/ruff check
