@@ -29,7 +29,7 @@ def test_table_and_file_hold_the_row(tmp_path):
         assert next(csv.DictReader(file))["iterations"] == "17"
 
 
-@pytest.mark.parametrize(("law", "spans"), [("poisson", 8), ("elasticity", 3)])
+@pytest.mark.parametrize(("law", "spans"), [("poisson", 8), pytest.param("elasticity", 3, marks=pytest.mark.slow)])
 def test_mfem_agrees(law, spans):
     pytest.importorskip("mfem.ser")
     theirs, ours = benchmark.run_mfem(case("mfem", law, spans)), benchmark.run_ours(case(law=law, spans=spans))

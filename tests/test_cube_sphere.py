@@ -119,7 +119,9 @@ def test_the_energy_falls_and_no_step_turns_a_triangle_over():
     assert not turned_over(relaxed, faces).any()
 
 
-@pytest.mark.parametrize(("rings", "around", "length"), [(300, 8, 150.0), (40, 30, 100.0)])
+@pytest.mark.parametrize(
+    ("rings", "around", "length"), [pytest.param(300, 8, 150.0, marks=pytest.mark.slow), (40, 30, 100.0)]
+)
 def test_a_needle_is_laid_out_whole_without_a_warning(rings, around, length):
     """Its plain layout shrinks to less than the numbers can tell apart: to triangles of no area."""
     vertices, faces = rod(rings, around, length)

@@ -305,6 +305,7 @@ PICKED = "document.querySelector('.picked')?.innerText"
 BOX = [1.0, 2.0, 3.0]
 
 
+@pytest.mark.slow
 def test_a_click_on_the_part_names_its_face(in_browser, page, tmp_path):
     in_browser(lambda browser: pick(browser, page, tmp_path))
 

@@ -34,7 +34,7 @@ def distances(volume):
     return contact(volume).distances(control_of(volume))
 
 
-@pytest.mark.parametrize("depth", [3e-2, 1e-2])
+@pytest.mark.parametrize("depth", [pytest.param(3e-2, marks=pytest.mark.slow), 1e-2])
 def test_the_depth_is_that_by_which_the_turns_overlap(depth):
     found = distances(spring(-depth))
     assert len(found) > 100

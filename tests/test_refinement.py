@@ -100,6 +100,7 @@ def test_knots_are_inserted_until_the_tolerance_is_met(first, once):
         assert set(KNOTS[0]) < set(row)
 
 
+@pytest.mark.slow
 def test_no_direction_gets_more_than_the_limit(first):
     found, fit, told = refined(first, tolerance=1e-9, max_control_points=7)
     assert told.stopped == "limit reached"

@@ -31,6 +31,7 @@ def test_rates_with_natural_data_and_one_face_held(name):
     assert last_rate(body, law) > 2.7
 
 
+@pytest.mark.slow
 def test_rates_of_a_frame_of_genus_five():
     body = frame(2, 2)
     assert last_rate(body, iga_nn.Poisson(exact=WAVE)) > 2.9
@@ -75,7 +76,7 @@ def iterations(body, problem):
     return found.iterations
 
 
-@pytest.mark.parametrize(("name", "spans"), [("plate", 8), ("frame", 6)])
+@pytest.mark.parametrize(("name", "spans"), [("plate", 8), pytest.param("frame", 6, marks=pytest.mark.slow)])
 def test_iterations_of_patches_in_a_grid(name, spans):
     body = BODIES[name](spans)
     assert iterations(body, iga_nn.Poisson(exact=WAVE)) <= 30

@@ -141,7 +141,7 @@ def test_nothing_inside_is_left_out_of_the_lattice(stretch):
     assert np.array_equal(found, np.unique(found, axis=0))  # each once, in their order
 
 
-@pytest.mark.parametrize("count", [12, 400])
+@pytest.mark.parametrize("count", [pytest.param(12, marks=pytest.mark.slow), 400])
 def test_a_needle_askew_takes_the_memory_of_what_is_in_it(count):
     """Of the box around it, 16 cubed, the lattice has 4 million points, and the needle some 5000 of them."""
     vertices, faces = ball(count)

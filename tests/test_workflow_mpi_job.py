@@ -76,6 +76,7 @@ def test_a_process_that_fails_ends_the_job(how, folder):
     json.loads((folder / "out" / "report.json").read_text())
 
 
+@pytest.mark.slow
 def test_more_processes_than_spans_is_a_line(tmp_path):
     benchmark_volume(1).save(tmp_path / "map.npz")
     done = mpiexec(2, *SOLVE[:-3], "0", "--mpi", "--quiet", "--out", "out", cwd=tmp_path)
