@@ -2,7 +2,7 @@
 
 The boundary's parameters slide between steps (surface_distance.py). Alternate steps and slides converge linearly;
 acceleration.py guesses the limit, and the guess is used where its energy is lower. On twelve models it earns 1 % of
-the distortion; without it one of twelve hard surfaces, a bulb, stays folded.
+the distortion; without it one of ten hard surfaces, a bulb, stays folded.
 """
 
 import logging
