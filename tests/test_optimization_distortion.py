@@ -63,7 +63,7 @@ def test_floors_that_are_lowered_keep_the_gradient_true():
     control = control.reshape(3, -1)
     distortion, determinants = Distortion(nets, nets.knots), DeterminantPenalty(nets, nets.knots)
     distortion.terms[0].penalty = 1e3
-    determinants.activate(in_blocks([2 * np.argwhere(np.ones((10, 10, 10)))]))
+    determinants.activate(in_blocks([2 * np.argwhere(np.ones((10, 10, 10)))]))  # every other span a direction
     determinants.lower_floors(distortion.lower_floors(control, 0.05))
     direction = np.random.default_rng(1).normal(size=control.shape)
 

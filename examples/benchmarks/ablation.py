@@ -41,6 +41,7 @@ from parameterize.optimization.endings import Reason
 from parameterize.optimization.energy import SplineEnergy
 from parameterize.optimization.sliding import SlidingParameters
 from parameterize.starts import blocks as starts_blocks
+from parameterize.starts import body as starts_body
 from parameterize.starts import growth, network, on_cube, sharp, start
 
 WHOLE = "nothing"  # is left out
@@ -170,8 +171,8 @@ PARTS: dict[str, Part] = {
     ),
     "soft rounds": Part(
         "the last rounds of blocks, with the usual weights",
-        put(starts_blocks, softened=lambda stiff, *_: stiff),
-        IN_BLOCKS,
+        together(*(put(made, softened=lambda stiff, *_: stiff) for made in (starts_blocks, starts_body))),
+        starts_with("blocks", "body with stubs"),
     ),
     "merging": Part("merging of near junctions", put(layout, merge=lambda skeleton, _: skeleton), IN_BLOCKS),
     "race": Part("the race between two turns of the cube", train(race=0.0), trained),
