@@ -31,6 +31,15 @@ def test_steps_after_the_first_stage_are_halved(monkeypatch):
     assert [stage.steps for stage in halved] == [max(1, round(0.5 * stage.steps)) for stage in later]
 
 
+def test_the_options_without_a_part_hold_while_it_runs():
+    """Else what is finished without the part would not be known again, and a second run would be refused."""
+    with ablation.options_without("muon"):
+        assert preset("fast").train.matrix_rate == 0.0
+    assert preset("fast").train.matrix_rate > 0.0
+    with ablation.options_without("nothing"):
+        assert preset("fast").train.matrix_rate > 0.0
+
+
 @pytest.mark.parametrize(("given", "said"), [(["--without", "luck"], "no such part"), (["--jobs", "0"], "at least 1")])
 def test_bad_arguments_are_one_line(given, said, capsys):
     with pytest.raises(SystemExit):

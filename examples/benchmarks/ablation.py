@@ -12,7 +12,8 @@ after each surface; copy them to results/ when they are to be kept.
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass, replace
 from math import exp, log
 from pathlib import Path
@@ -44,6 +45,7 @@ from parameterize.starts import blocks as starts_blocks
 from parameterize.starts import body as starts_body
 from parameterize.starts import growth, network, on_cube, sharp, start
 
+NAME = "ablation.py"
 WHOLE = "nothing"  # is left out
 Tried = list[dict[str, Any]]  # the attempts of a report
 
@@ -256,8 +258,9 @@ def main(argv: list[str] | None = None) -> int:
 
         tasks = [Task(name, str(options.meshes[name]), options.out / part / name, MAPPING, None) for name in names]
         workers = WorkerOptions(workers=options.jobs, memory_limit="0")
-        if tasks and (code := processes.run("ablation.py", options.out / part, tasks, workers, keep, compute_without)):
-            return code
+        with options_without(part):
+            if tasks and (code := processes.run(NAME, options.out / part, tasks, workers, keep, compute_without)):
+                return code
     write_tables(list(rows.values()), options)
     print(as_text(list(rows.values()), options))
     return 0
@@ -268,7 +271,7 @@ FIRST, LATER_FIRST = 120, 40  # the hard surfaces begin here: the tables of the 
 
 
 def _options(argv: list[str] | None) -> Options:
-    parser = processes.parser_of_surfaces("ablation.py", __doc__, Path("out/ablation"))
+    parser = processes.parser_of_surfaces(NAME, __doc__, Path("out/ablation"))
     models = Path(os.environ.get(DATA_FOLDER) or REPOSITORY.parent / "shared" / "models")
     parser.add_argument("--models", type=Path, default=models, help=f"folder of NAME.obj (default: {models})")
     parser.add_argument("--without", nargs="+", default=list(PARTS), metavar="PART", help="leave out these parts alone")
@@ -294,6 +297,16 @@ def _numbers(kind: str, count: int) -> list[int]:
     """The first numbers of a kind from FIRST on, or from LATER + LATER_FIRST on."""
     first = FIRST if any(kind_of(number) == kind for number in range(LATER)) else LATER + LATER_FIRST
     return [number for number in range(first, first + LATER) if kind_of(number) == kind][:count]
+
+
+@contextmanager
+def options_without(part: str) -> Iterator[None]:
+    """Give this process the default options without a part: by these it knows what is finished. Others compute."""
+    presets = dict(config.PRESETS)
+    if part != WHOLE:
+        PARTS[part].leave_out()
+    yield
+    config.PRESETS.update(presets)
 
 
 def compute_without(task: Task, number: int, batch: str) -> Ended:
