@@ -7,9 +7,9 @@ the anchors would hold F at that part: those of one cube are aimed in the last r
 earned nothing on twelve models (ARAP and distance 1.00 times without them).
 
 Several blocks, whose anchors always act, start as a skeleton of the solid, so a face may lie in a crease between two
-others, where no point of the surface is near: nothing but anchors on the faces draws it out. Without them a hand and a
-limbed body end 1.05 times as far from their surfaces; before its palm was cut into strips another hand ended 33 times as
-far, most of it in two creases. The faces of one cube have points of the surface everywhere.
+others, where no point of the surface is near: nothing but anchors on the faces draws it out. Without them a hand and
+a limbed body end 1.05 times as far from their surfaces; before its palm was cut into strips another hand ended 33 times
+as far, most of it in two creases. The faces of one cube have points of the surface everywhere.
 
 Corners that the user gives are held until the map is certified; in the last rounds they may move a little, because the
 boundary crosses itself beside corners that are held to the end.
