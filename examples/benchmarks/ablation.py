@@ -303,10 +303,12 @@ def _numbers(kind: str, count: int) -> list[int]:
 def options_without(part: str) -> Iterator[None]:
     """Give this process the default options without a part: by these it knows what is finished. Others compute."""
     presets = dict(config.PRESETS)
-    if part != WHOLE:
-        PARTS[part].leave_out()
-    yield
-    config.PRESETS.update(presets)
+    try:
+        if part != WHOLE:
+            PARTS[part].leave_out()
+        yield
+    finally:
+        config.PRESETS.update(presets)
 
 
 def compute_without(task: Task, number: int, batch: str) -> Ended:

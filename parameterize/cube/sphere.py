@@ -32,9 +32,9 @@ _LEAST_ROOM = 1e-40  # least area of a triangle on the sphere, as a share of its
 _LEAST_SHARE = 0.25  # of a divided edge's length, from its new vertex to either end
 _SQUEEZED = 1e8  # energy of the first layout above which others are tried; that of a relaxed layout is some 50
 _AWAY = 10.0  # extra weight of edges pointing away from the rim, in the second layout
-# In the next layouts: the higher, the less edges that lead aside count. After Newton's steps the layouts of 41 hard
-# surfaces are alike within 2 %, with whichever they began; but one bulb that began with equal weights ended folded, and
-# with power 4 instead of 2 it ended 1.5 times as far.
+# In the next layouts: the higher, the less edges that lead aside count. Four of 41 hard surfaces go beyond the first
+# layout, and after Newton's steps their energy differs by some 2 % at most from that after the first one. Still, one of
+# them, a bulb, ends folded from there, and with power 4 instead of 2 it ends 1.5 times as far.
 _POWERS = (2, 4, 8, 16, 32, 64)
 _ONE_WAY_POWERS = (4, 16)  # in the last layouts, where a point is pulled by neighbours nearer to the rim alone
 _STEPS = 300  # Newton steps, at most

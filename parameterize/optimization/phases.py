@@ -30,7 +30,7 @@ GIVING_WAY = 0.25  # factor of the surface's weights there, each round: an edge 
 _CONTACT_WAY = 0.0625  # the same where the boundary meets itself: these rounds are few
 _STALLING = 8  # rounds in which the unproved spans are not halved: another start costs as much as waiting longer
 _SMOOTHING_ROUNDS = 2  # the same; F is then smoothed there, as no descent undoes some folds
-# Spans that stay unproved: smoothing F near more would take its shape away. It helps one of 20 surfaces: without it the
+# Spans that stay unproved: smoothing F near more would take its shape away. It helps one of 19 surfaces: without it the
 # network's map of a spiky one stalls, and a growth with 1.18 times the distortion takes its place.
 _MOST_SMOOTHED = 10
 _MENDINGS = 6  # attempts to restore certified control points around spans that fold again
