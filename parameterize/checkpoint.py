@@ -18,7 +18,15 @@ from safetensors.numpy import save as to_bytes
 from .files import save_bytes
 
 FORMAT = 9  # a file of another one is refused by name
-NAMES = ("training", "spline", "knots")
+KEPT = {  # the checkpoints of a run by their names, in the order of its stages, and what they hold
+    "choice": "the choice of blocks",
+    "first": "the blocks that are laid",
+    "training": "the training",
+    "sphere": "the layout on the sphere",
+    "spline": "the rounds of the spline",
+    "knots": "the refinement",
+    "solve": "the levels that are solved",
+}
 _ANEW = "start anew with --force instead of --resume"
 _DAMAGED = "remove this file to continue from an earlier checkpoint, or start anew with --force"
 
@@ -31,14 +39,14 @@ class Checkpoints:
     """The checkpoint files of one run in one folder.
 
     identity: the surface and all options of the run, as plain JSON values; a checkpoint of another run is refused.
-    folder None keeps nothing; `resume` False removes the checkpoints (NAMES) that are there.
+    folder None keeps nothing; `resume` False removes the checkpoints (KEPT) that are there.
     """
 
     def __init__(self, folder: Path | None, identity: Mapping[str, Any], *, resume: bool) -> None:
         self._folder, self._resume, self._suffix = folder, resume, ""
         self._identity = json.dumps(identity, sort_keys=True)
         if folder is not None and not resume:
-            for path in [path for name in NAMES for path in folder.glob(f"{name}*.safetensors")]:
+            for path in [path for name in KEPT for path in folder.glob(f"{name}*.safetensors")]:
                 path.unlink()
 
     def of_part(self, name: str | int) -> "Checkpoints":

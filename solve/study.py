@@ -97,7 +97,11 @@ def convergence(
     if not levels:
         raise ValueError(f"refine must be levels such as range(3), got {refine!r:.80}")
     options = SolveOptions(degree=degree, certified=certified, tolerance=tolerance)
-    reports = [solve_with(volume, problem, replace(options, refine=level)).report for level in levels]
+    return with_rates([solve_with(volume, problem, replace(options, refine=level)).report for level in levels])
+
+
+def with_rates(reports: Sequence[SolveReport]) -> Convergence:
+    """Return the rows of some solves, coarsest first, with the observed orders between neighbours."""
     found = rates(reports)
     l2, h1 = ([None, *found.get(name, [None] * len(reports))] for name in ("l2", "h1"))
     return Convergence(ConvergenceRow(report, l2[i], h1[i]) for i, report in enumerate(reports))

@@ -126,7 +126,8 @@ def verdicts(report: Report) -> list[tuple[str, str, str]]:
     color = "good" if reports.is_certified(report) else "bad" if answer == "no" else "unsure"
     found = [(color, f"{claim}: {quality['bijective']}; one-to-one: {answer}", meaning)]
     if "not_solved" in report:
-        found.append(("bad", "The problem was not solved", report["not_solved"]))
+        what = "A level was not solved" if reports.solved(report) else "The problem was not solved"
+        found.append(("bad", what, report["not_solved"]))
     if not reports.is_meaningful(report):
         found.append(("bad", "The errors mean nothing", "The notices below say why."))
     if not reports.is_converged(report):

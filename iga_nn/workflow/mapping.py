@@ -13,8 +13,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from parameterize.arrays import Array, IntArray
+from parameterize.checkpoint import differing
 from parameterize.compilation import compilation_told
-from parameterize.files import save_arrays
+from parameterize.files import array_names, load_arrays, save_arrays
 from parameterize.progress import Progress, ProgressCallback
 from parameterize.spline.multipatch import MultiPatch
 from parameterize.spline.volume import FACE_NAMES
@@ -27,9 +28,11 @@ from solve.forms.frame import UnitFrame
 
 from ..errors import InputError, input_errors
 from ..figures.evaluate import Body
+from ..io.formats import load_volume
 from ..models import resolve
 from ..options import MapOptions
 from ..report import document as reports
+from ..report.artifacts import SOLVED
 from ..report.patches import unproved_places, with_unproved
 from ..rounding import rounded
 from .cost_estimate import Forecast, forecast, warn_of_memory
@@ -42,6 +45,7 @@ if TYPE_CHECKING:
 
 log = logging.getLogger(__name__)
 
+_OF_MAP = ("volume.npz", "boundary.npz", "history.npz")
 _TRIED = 50  # points of the surface
 _CORNERS_BYTES = 65_536
 _LARGEST_COORDINATE = 1e100  # distances of larger ones overflow
@@ -116,6 +120,38 @@ def map_surface(
     _write(state, given, expected, result, mapping)
     _draw_defects(state, result)
     return result
+
+
+def kept_map(
+    state: RunFolder, given: MapInput, known: dict[str, Any], problem: BoundaryValueProblem | None
+) -> Body | None:
+    """Return the certified map that an interrupted run of the same options has left; None where there is none.
+
+    Its report is taken over, and its figures are drawn, because the interruption may have come before them. The
+    arguments are those of `map_surface`.
+    """
+    report = reports.read(state.folder)
+    if report is None or not _is_of_map(report, given) or not all((state.folder / name).is_file() for name in _OF_MAP):
+        return None
+    if problem is not None:
+        _check_data(problem, given.surface)
+    state.report = {name: value for name, value in report.items() if name not in (*SOLVED, "not_solved", "not_drawn")}
+    state.seconds.update(state.report.pop("seconds"))
+    state.sweep()
+    state.write(**known)
+    log.info("%s: the map is there, and kept", state.folder)
+    body = load_volume(state.folder / "volume.npz")
+    history = state.folder / "history.npz"
+    _draw(state, given, body, load_arrays(history, tuple(array_names(history))))
+    return body
+
+
+def _is_of_map(report: reports.Report, given: MapInput) -> bool:
+    """Return whether a report tells of a finished map with this identity that is certified."""
+    if "parameterization" not in report or not reports.is_certified(report):
+        return False
+    found = {name: report.get("identity", {}).get(name) for name in given.identity}
+    return not differing(reports.plain(given.identity), found)
 
 
 def _prepare(

@@ -8,8 +8,9 @@ from contextlib import AbstractContextManager, ExitStack, contextmanager, suppre
 from dataclasses import dataclass, field
 from pathlib import Path
 from tempfile import TemporaryFile
-from typing import Any
+from typing import Any, get_args
 
+from parameterize.checkpoint import KEPT
 from parameterize.files import unfinished
 from parameterize.progress import timed
 
@@ -101,7 +102,13 @@ class RunFolder:
                 what += f"; `iga-nn solve poisson {self.folder / 'volume.npz'}` solves on its volume"
             raise InputError(f"{self.folder}: {what}; --force replaces the files there, --out names another folder")
         for target in targets:
-            for old in (target, *unfinished(target)):
+            target.unlink(missing_ok=True)
+        self.sweep(*parts)
+
+    def sweep(self, *parts: Part) -> None:
+        """Remove what a killed run has left of files that it was writing; without `parts` those of all of them."""
+        for name in files_of("report", *(parts or get_args(Part))):
+            for old in unfinished(self.folder / name):
                 old.unlink(missing_ok=True)
 
     def write(self, **sections: Any) -> None:
@@ -181,6 +188,9 @@ def _finished_result(folder: Path, force: bool, resume: bool) -> Outcome | None:
         raise InputError(f"{folder}: holds a finished result; --force replaces it, --out names another folder")
     if has_checkpoint(folder) and not resume:
         raise InputError(f"{folder}: holds an interrupted run; --resume continues it, --force starts anew")
+    if known and not finished and not resume and reports.solved(known):
+        what = "holds levels of an interrupted solve; --force solves all anew, --out names another folder"
+        raise InputError(f"{folder}: {what}")
     return finished
 
 
@@ -228,15 +238,24 @@ def forget(folder: Path) -> None:
             shutil.rmtree(folder / CHECKPOINT, ignore_errors=True)
 
 
+def _last_kept(folder: Path) -> str:
+    """Return in words what the last checkpoint in the folder holds."""
+    last = max((folder / CHECKPOINT).glob("*.safetensors"), key=lambda path: path.stat().st_mtime_ns)
+    return KEPT.get(last.name.split(".")[0].split("-")[0], "the checkpoint")
+
+
 def has_checkpoint(folder: Path) -> bool:
     """Return whether an interrupted training left a checkpoint in the folder."""
     return any((folder / CHECKPOINT).glob("*.safetensors"))
 
 
 def _way_on(folder: Path) -> str:
-    """Return in words how to continue after an interruption."""
+    """Return in words what is done, and how to continue after an interruption."""
     if has_checkpoint(folder):
-        return "the same command with --resume continues from the checkpoint"
+        return f"the same command with --resume goes on from {_last_kept(folder)}"
+    report = reports.read(folder) or {}
+    if levels := reports.solved(report).get("levels"):
+        return f"{len(levels)} level{'s' * (len(levels) > 1)} done, in {folder / REPORT}"
     if (folder / "volume.npz").exists():
         return f"the volume is written: `iga-nn solve` with {folder / 'volume.npz'} solves on it"
     return "nothing was computed yet that could be resumed"

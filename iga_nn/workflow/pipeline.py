@@ -8,13 +8,13 @@ from collections import deque
 from collections.abc import Callable
 from contextlib import ExitStack, nullcontext
 from dataclasses import asdict, replace
-from itertools import chain
+from itertools import chain, product
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from parameterize.checkpoint import differing
+from parameterize.checkpoint import Checkpoints, differing
 from parameterize.files import save_text
 from parameterize.progress import ProgressCallback
 from parameterize.spline.multipatch import as_multipatch
@@ -23,11 +23,12 @@ from parameterize.threads import default_threads
 from solve import ConvergenceRow, check_device, check_problem, convergence, modes
 from solve.discretization.slab import agreed
 from solve.forms.boundary_value_problem import BoundaryValueProblem
+from solve.study import with_rates
 
 from ..errors import InputError, input_errors
 from ..figures.evaluate import Body
 from ..io.formats import load_volume
-from ..level_table import as_csv, as_table, rows_of
+from ..level_table import Study, as_csv, as_table, rows_of
 from ..options import (
     NO_UNITS,
     PROBLEMS,
@@ -44,11 +45,11 @@ from ..report import html
 from ..type_check import check_type
 from .command_line import command_line
 from .cost_estimate import tell_memory
-from .mapping import MapInput, map_surface, read_input
-from .output_folder import Outcome, RunFolder, default_folder, open_folder
+from .levels import Found, KeptLevels
+from .mapping import MapInput, kept_map, map_surface, read_input
+from .output_folder import CHECKPOINT, Outcome, RunFolder, default_folder, open_folder
 from .painter import Painter
 from .solving import (
-    Found,
     described,
     each_level,
     moving_scene_of,
@@ -158,12 +159,15 @@ def parameterize_to(
         if state.finished:
             return _finished_by(identity, state.finished, vector, statement)
         known = {"command": _command(mesh, out, mapping, statement), "identity": identity}
-        result = map_surface(state, given, mapping, progress, known, problem, unknowns)
+        body = kept_map(state, given, known, problem) if mapping.resume else None
+        if body is None:
+            body = map_surface(state, given, mapping, progress, known, problem, unknowns).volume
         if statement is None or problem is None:
-            return _finish(state, result.volume)
-        problem = problem.on_surface(result.boundary.part)
-        solution = solve_levels(state, result.volume, problem, statement, statement.solve_options())
-        return _finish(state, result.volume, solution, problem, statement.units)
+            return _finish(state, body)
+        problem = with_part(problem, state.folder / "volume.npz")
+        kept = KeptLevels(state.folder, Checkpoints(state.folder / CHECKPOINT, given.identity, resume=True), statement)
+        solution = solve_levels(state, body, problem, statement, statement.solve_options(), kept)
+        return _finish(state, body, solution, problem, statement.units)
 
 
 def _command(mesh: str | Path, out: str | Path | None, mapping: MapOptions, statement: ProblemOptions | None) -> str:
@@ -285,17 +289,34 @@ def study_to(
     with open_folder(path, f"{default_folder(path)}-study" if out is None else out, force, vector=vector) as state:
         state.begin("study")
         write_certificate(state, path, loaded, command_line(study_options.command, path, study_options, out=out))
-        study: dict[int, list[ConvergenceRow]] = {}
-        with reported(state, loaded), state.timed("solve"), input_errors():
-            for degree in degrees:
-                study[degree] = convergence(loaded, problem, levels, degree, certified=verdict_of(state))
-                log.info("degree %d: solved", degree)
-        save_text(state.folder / "study.csv", as_csv(study))
-        notices = notices_of(row.report for row in chain(*study.values()))
         known = described(problem, loaded) | ({"exact": study_options.exact} if study_options.exact else {})
-        state.write(study=known | {"levels": rows_of(study), "notices": notices})
-        state.draw("study", study=study)
+        study: dict[int, list[ConvergenceRow]] = {}
+
+        def missing() -> str:
+            count = len(degrees) * len(levels) - sum(map(len, study.values()))
+            return f"{count} of the solves are missing, those before are complete" if study else ""
+
+        def show() -> tuple[()]:
+            if study:
+                state.draw("study", study=study)
+            return ()
+
+        with reported(state, loaded, missing, show), state.timed("solve"), input_errors():
+            for degree, level in product(degrees, levels):
+                solved = convergence(loaded, problem, (level,), degree, certified=verdict_of(state))
+                before = [row.report for row in study.get(degree, [])]
+                study[degree] = with_rates([*before, *(row.report for row in solved)])
+                _write_study(state, study, known)
+                log.info("degree %d, refine %d: solved", degree, level)
+        show()
         return _finish(state, loaded), as_table(study)
+
+
+def _write_study(state: RunFolder, study: Study, known: dict[str, Any]) -> None:
+    """Write the table of a study, as far as it is solved, and its section of the report."""
+    save_text(state.folder / "study.csv", as_csv(study))
+    notices = notices_of(row.report for row in chain(*study.values()))
+    state.write(study=known | {"levels": rows_of(study), "notices": notices})
 
 
 def modes_to(

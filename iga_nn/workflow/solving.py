@@ -2,7 +2,7 @@
 
 import logging
 import time
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, replace
 from itertools import zip_longest
@@ -14,7 +14,6 @@ from solve import ConvergenceError, ConvergenceRow, Modes, SolveOptions, SolveRe
 from solve.forms.boundary_value_problem import BoundaryValueProblem
 from solve.forms.condition import WITH_FACTOR, Condition
 from solve.forms.frame import UnitFrame
-from solve.solution import MultiPatchSolution, Solution
 
 from ..errors import InputError, input_errors, one_line
 from ..figures.evaluate import Body, fields_on
@@ -22,11 +21,10 @@ from ..options import NO_UNITS, ProblemOptions, Units
 from ..report import document as reports
 from ..report import html
 from ..report.extremes import growth_notices
+from .levels import SOLUTION, Found, KeptLevels, Levels
 from .output_folder import RunFolder
 
 log = logging.getLogger(__name__)
-
-Found = Solution | MultiPatchSolution
 
 
 def solve_levels(
@@ -35,37 +33,65 @@ def solve_levels(
     problem: BoundaryValueProblem,
     statement: ProblemOptions,
     options: SolveOptions,
+    kept: KeptLevels | None = None,
 ) -> Found:
     """Solve level after level, write the report of all levels, and return the finest solution.
 
-    solution.npz holds the finest solution so far.
+    Each level is in report.json, and its solution in solution.npz, as soon as it is done. Where a later one is
+    interrupted or fails, the page, the figures and solution.vtu are those of the finest that is done. kept: the levels
+    of an interrupted run, and the place for those of this one; None where no run can go on from them.
     """
     options = replace(options, certified=verdict_of(state))
-    solutions: list[Found] = []
-    levels: list[dict[str, Any]] = []
-    with reported(state, body), state.timed("solve"):
-        for solution in each_level(body, problem, statement.refine, options):
-            solution.save(state.folder / "solution.npz")
-            solutions.append(solution)
-            levels.append(level_of(solution))
-    found = [solution.report for solution in solutions]
-    growth = growth_notices({**asdict(statement), "levels": levels}) if problem.exact is None else []
-    for notice in growth:
+    done = kept.load(body, problem) if kept else Levels()
+    left = sorted(statement.refine)[len(done.refine) :]
+    if problem.form.components == 1:
+        options = replace(options, start=done.finest)
+
+    def show() -> tuple[Any, ...]:
+        return _show(state, body, done, problem, statement) if done.refine else ()
+
+    with reported(state, body, lambda: done.missing(statement.refine), show), state.timed("solve"):
+        for level, solution in zip(left, each_level(body, problem, left, options), strict=True):
+            entry = level_of(solution)
+            solution.save(state.folder / SOLUTION)
+            done.add(level, entry, solution)
+            state.write(**{statement.section: section_of(statement, problem, body, done)})
+            if kept and is_finite(solution):
+                kept.save(done)
+    for notice in _growth(statement, problem, done):
         log.warning("%s", notice)
+    _show(state, body, done, problem, statement)
+    assert done.finest is not None  # there is one level at least
+    return done.finest
+
+
+def section_of(statement: ProblemOptions, problem: BoundaryValueProblem, body: Body, done: Levels) -> dict[str, Any]:
+    """Return the section of report.json on a problem and the levels that are done."""
     asked = {name: given for name, given in asdict(statement).items() if name not in ("refine", "degree")}
     known = asked | described(problem, body)
-    state.write(
-        **{
-            statement.section: {name: value for name, value in known.items() if value is not None and value != ()}
-            | ({"regions": regions_of(problem, found[-1])} if problem.conditions else {})
-            | {"levels": levels, "rates": rates(found), "notices": [*notices_of(found), *growth]}
-        }
+    notices = [*notices_of(done.reports), *_growth(statement, problem, done)]
+    return (
+        {name: value for name, value in known.items() if value is not None and value != ()}
+        | ({"regions": regions_of(problem, done.reports[-1])} if problem.conditions else {})
+        | {"levels": done.entries, "rates": rates(done.reports), "notices": notices}
     )
-    _draw(state, body, solutions, problem, statement.units)
+
+
+def _growth(statement: ProblemOptions, problem: BoundaryValueProblem, done: Levels) -> list[str]:
+    """Return the notices on what grows from level to level; none where the exact solution is known."""
+    return growth_notices({**asdict(statement), "levels": done.entries}) if problem.exact is None else []
+
+
+def _show(
+    state: RunFolder, body: Body, done: Levels, problem: BoundaryValueProblem, statement: ProblemOptions
+) -> tuple[Found, BoundaryValueProblem, Units]:
+    """Draw the finest solution, write it for ParaView, and return what its view takes."""
+    assert done.finest is not None
+    _draw(state, body, done, problem, statement.units)
     if len(problem.dirichlet) < 6 or problem.patch_faces:  # the user names faces: show which is which
         state.draw("solution", named_volume=body)
-    _write_cells(state, solutions[-1])
-    return solutions[-1]
+    _write_cells(state, done.finest)
+    return done.finest, problem, statement.units
 
 
 def level_of(solution: Found) -> dict[str, Any]:
@@ -74,8 +100,8 @@ def level_of(solution: Found) -> dict[str, Any]:
     started = time.process_time()
     try:
         extremes = {name: found.as_dict() for name, found in solution.all_extremes().items()}
-    except ValueError as error:  # not finite: the solver broke down, or det J is zero somewhere
-        log.info("no extremes: %s", one_line(error))
+    except (ValueError, MemoryError) as error:  # not finite: the solver broke down, or det J is zero somewhere
+        log.info("no extremes: %s", one_line(error) or "the memory does not suffice")
     seconds = level["seconds"] | {"extremes": time.process_time() - started}
     return level | {"extremes": extremes, "seconds": seconds}
 
@@ -101,15 +127,27 @@ def each_level(
 
 
 @contextmanager
-def reported(state: RunFolder, body: Body) -> Iterator[None]:
-    """Write the page without a solution, and the reason into the report, where the block does not solve the problem."""
+def reported(
+    state: RunFolder,
+    body: Body,
+    missing: Callable[[], str] = str,
+    show: Callable[[], tuple[Any, ...]] = tuple,
+) -> Iterator[None]:
+    """Where the block ends early, write the reason into the report, show what is done, and write the page.
+
+    missing: returns in words what is done and what is not; "" where nothing is done. show: draws what is done, and
+    returns what the view of it takes, see `scene_of`.
+    """
     try:
         yield
-    except (InputError, ConvergenceError) as error:
+    except (InputError, ConvergenceError, KeyboardInterrupt) as error:
+        if isinstance(error, KeyboardInterrupt):
+            log.warning("interrupted: what is done is written; once more leaves that out")
+        said = one_line(error) or "interrupted"
+        state.write(not_solved=f"{said}; {rest}" if (rest := missing()) else said)
+        scene = scene_of(state, body, *show())
         state.wait_for_figures()
-        state.write(not_solved=one_line(error))
-        known = reports.plain(state.report | {"seconds": state.seconds})
-        html.write(state.folder, known, scene_of(state, body))
+        html.write(state.folder, reports.plain(state.report | {"seconds": state.seconds}), scene)
         raise
 
 
@@ -136,21 +174,20 @@ def is_finite(solution: Found) -> bool:
     return all(bool(np.all(np.isfinite(field.coefficients))) for field in fields_on(solution))
 
 
-def _draw(
-    state: RunFolder, body: Body, solutions: Sequence[Found], problem: BoundaryValueProblem, units: Units
-) -> None:
-    """Draw the solution, its error where the exact solution is known, and the convergence of several levels.
+def _draw(state: RunFolder, body: Body, done: Levels, problem: BoundaryValueProblem, units: Units) -> None:
+    """Draw the finest solution, its error where the exact solution is known, and the convergence of several levels.
 
-    Solutions with coefficients that are not finite, after a failure of the solver, are not drawn.
+    A solution with coefficients that are not finite, after a failure of the solver, is not drawn.
     """
-    if not all(map(is_finite, solutions)):
+    assert done.finest is not None
+    if not is_finite(done.finest):
         return
-    known: dict[str, Any] = {"volume": body, "solution": solutions[-1], "units": units}
+    known: dict[str, Any] = {"volume": body, "solution": done.finest, "units": units}
     if problem.exact is not None:
         known["problem"] = problem
-        if len(solutions) > 1:
-            rows = [ConvergenceRow(solution.report, None, None) for solution in solutions]
-            known["levels"] = {max(max(field.degrees) for field in fields_on(solutions[-1])): rows}
+        if len(done.reports) > 1:
+            rows = [ConvergenceRow(report, None, None) for report in done.reports]
+            known["levels"] = {max(max(field.degrees) for field in fields_on(done.finest)): rows}
     if problem.conditions:
         known["conditions"] = (problem.placed(UnitFrame.of(body)) if problem.is_scaled else problem).conditions
     state.draw("solution", **known)
@@ -200,12 +237,18 @@ def notices_of(found: Iterable[SolveReport]) -> list[str]:
     return list(dict.fromkeys(notice for item in found for notice in item.notices))
 
 
-def scene_of(state: RunFolder, body: Body, *solved: Any, units: Units = NO_UNITS) -> Any:
+def scene_of(
+    state: RunFolder,
+    body: Body,
+    solution: Found | None = None,
+    problem: BoundaryValueProblem | None = None,
+    units: Units = NO_UNITS,
+) -> Any:
     """Return the interactive view of a body and a solution on it; None where it cannot be drawn."""
     with state.timed("report"), state.drawing("interactive view"):
         from ..report import viewer
 
-        return viewer.scene_of(body, *solved, units=units)
+        return viewer.scene_of(body, solution, problem, units=units)
     return None
 
 

@@ -1,0 +1,135 @@
+"""Holds the levels that a problem was solved on so far, and keeps them for a run that goes on with the next one."""
+
+import hashlib
+import logging
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+from parameterize.checkpoint import Checkpoints
+from parameterize.spline.multipatch import MultiPatch, as_multipatch
+from solve import SolveReport
+from solve.discretization.errors import Errors
+from solve.field import MultiPatchField, SplineField
+from solve.forms.boundary_value_problem import BoundaryValueProblem
+from solve.reactions import Balance
+from solve.solution import MultiPatchSolution, Solution
+
+from ..figures.evaluate import Body, problems_on
+from ..options import ProblemOptions
+from ..report import document as reports
+
+log = logging.getLogger(__name__)
+
+Found = Solution | MultiPatchSolution
+
+SOLUTION = "solution.npz"
+_CHECKPOINT = "solve"
+_MESHES = ("refine", "unit", "stress_unit")  # options that change no number of a level
+
+
+@dataclass
+class Levels:
+    """Hold the levels that are done, coarsest first.
+
+    refine: how many times each one halves the spans. entries: what report.json has of them. finest: the last solution.
+    """
+
+    refine: list[int] = field(default_factory=list)
+    entries: list[dict[str, Any]] = field(default_factory=list)
+    reports: list[SolveReport] = field(default_factory=list)
+    finest: Found | None = None
+
+    def add(self, refine: int, entry: dict[str, Any], solution: Found) -> None:
+        """Add a level with its entry of report.json and its solution."""
+        self.refine.append(refine)
+        self.entries.append(entry)
+        self.reports.append(solution.report)
+        self.finest = solution
+
+    def missing(self, asked: Iterable[int]) -> str:
+        """Return in words which of the levels that were asked for are done, and which is missing; "" for none done."""
+        if not self.refine:
+            return ""
+        rest = sorted(asked)[len(self.refine) :]
+        return f"refine {_listed(self.refine)} is complete, refine {_listed(rest)} is missing"
+
+
+@dataclass(frozen=True, eq=False)
+class KeptLevels:
+    """Keep the levels of a run in a checkpoint, whose solution is the file in the output folder.
+
+    folder: the output folder. checkpoints: those of the run's map. statement: the options of the problem.
+    """
+
+    folder: Path
+    checkpoints: Checkpoints
+    statement: ProblemOptions
+
+    @property
+    def _asked(self) -> dict[str, Any]:
+        """Return the options on which the numbers of a level depend, as plain JSON values."""
+        options = asdict(self.statement).items()
+        return {name: reports.plain(value) for name, value in options if name not in _MESHES}
+
+    def save(self, done: Levels) -> None:
+        """Keep the levels whose finest solution the output folder holds."""
+        state = {"asked": self._asked, "refine": done.refine, "entries": reports.plain(done.entries)}
+        state |= {"reports": [reports.plain(asdict(report)) for report in done.reports]}
+        state |= {"solution": _digest(self.folder / SOLUTION)}
+        self.checkpoints.save(_CHECKPOINT, {}, state)
+
+    def load(self, body: Body, problem: BoundaryValueProblem) -> Levels:
+        """Return the levels that are kept; none where others were asked for, or where the solution is not theirs.
+
+        Raises CheckpointError for a checkpoint of another run.
+        """
+        saved = self.checkpoints.load(_CHECKPOINT)
+        if saved is None:
+            return Levels()
+        _, state = saved
+        refine = state["refine"]
+        if state["asked"] != self._asked or refine != sorted(self.statement.refine)[: len(refine)]:
+            log.info("the levels that are done are those of another problem: all are solved anew")
+            return Levels()
+        if state["solution"] != _digest(self.folder / SOLUTION):
+            log.info("%s is not the solution of the last level: all are solved anew", self.folder / SOLUTION)
+            return Levels()
+        found = [_report(values) for values in state["reports"]]
+        finest = _loaded(self.folder / SOLUTION, body, found[-1], problem)
+        done = Levels(refine, state["entries"], found, finest)
+        log.info("refine %s: solved before the interruption", _listed(refine))
+        return done
+
+
+def _listed(levels: Iterable[int]) -> str:
+    return ", ".join(map(str, levels))
+
+
+def _digest(path: Path) -> str:
+    """Return the SHA-256 of a file; "" where there is none."""
+    return hashlib.sha256(path.read_bytes()).hexdigest() if path.is_file() else ""
+
+
+def _report(values: dict[str, Any]) -> SolveReport:
+    """Return the report of a solve from the values of its fields."""
+    parts = {name: Errors(**values[name]) if values[name] else None for name in ("errors", "estimate")}
+    given: dict[str, Any] = values | parts | {name: tuple(values[name]) for name in ("notices", "residuals")}
+    if balance := values["balance"]:
+        reactions = {name: tuple(row) for name, row in balance["reactions"].items()}
+        given["balance"] = Balance(**balance | {"load": tuple(balance["load"]), "reactions": reactions})
+    return SolveReport(**given)
+
+
+def _loaded(path: Path, body: Body, report: SolveReport, problem: BoundaryValueProblem) -> Found:
+    """Return the solution of a file on its body."""
+    fields = MultiPatchField.load(path).patches if isinstance(body, MultiPatch) else (SplineField.load(path),)
+    parts = zip(fields, as_multipatch(body).patches, problems_on(problem, body), strict=True)
+    patches = tuple(
+        Solution(one.degrees, one.knots, one.coefficients, patch, report=report, problem=own)
+        for one, patch, own in parts
+    )
+    if isinstance(body, MultiPatch):
+        return MultiPatchSolution(patches, body, report, problem.on(body))
+    return patches[0]
