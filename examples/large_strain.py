@@ -57,7 +57,7 @@ def main(out: str | Path = "out/large_strain") -> Path:
     print("residuals " + ", ".join(f"{residual:.0e}" for residual in bent.report.residuals))
     for name, field in {"small": iga_nn.solve(volume, small), "large": bent}.items():
         along, _, down = field(end)[0]
-        print(f"{name} strains: the end sinks by {-down:.3f}, and comes back by {-along:.3f}")
+        print(f"{name} strains: the end sinks by {-down:.3f}, and comes back by {-along:z.3f}")
     return draw(out, volume, bent, "displacement, as it is", exaggerate=1.0)
 
 

@@ -39,6 +39,32 @@ def test_a_region_holds_where_its_condition_says(text, expected):
     assert holds(text, "v1") == expected
 
 
+@pytest.mark.parametrize("moved", [-4e-15, -4e-16, 0.0, 4e-16, 4e-15])
+@pytest.mark.parametrize("size", [1e-6, 1.0, 1e6])
+def test_the_last_bits_of_a_point_decide_nothing(size, moved):
+    x = size * np.array([[0.0, 0.5, 1.0], [0.2, 0.2, 0.9], [1.0 + moved, 0.5, -moved]])
+    normal = np.array([[0.0, 0.6, 0.8], [0.0, 0.0, 0.0], [1.0 - abs(moved), 0.8, 0.6]])
+
+    def at(text):
+        return Region(text.replace("S", repr(size))).holds(x, normal).tolist()
+
+    assert at("box(0, 0, 0, S, S, S)") == [True, True, True]
+    assert at("z <= S") == at("z >= 0") == [True, True, True]
+    assert at("z < S") == [False, True, True] and at("z > 0") == [True, True, False]
+    assert at("not z < S") == at("z >= S") == [True, False, False]
+    assert at("x*x + z*z <= S*S") == at("sqrt(x**2 + z**2) <= S") == [True, True, True]
+    assert at("nz >= 1") == [True, False, False] and at("nz >= 0.8") == [True, True, False]
+    assert at("0 <= z <= S") == [True, True, True] and at("0 < z < S") == [False, True, False]
+    assert at("z < 1e-9*S") == [False, False, True]
+    assert at("max(x, z) >= S") == [True, False, True] and at("sqrt(x) >= 0") == [True, True, True]
+
+
+def test_far_from_the_origin_rounding_is_that_of_the_coordinates():
+    x = 1e7 + np.array([[0.0, 1.0], [0.0, 1.0], [1.0, 1.0 + 2e-9]])
+    assert Region("z <= 10000001").holds(x, np.ones((3, 2))).all()
+    assert not Region("z > 10000001").holds(x, np.ones((3, 2))).any()
+
+
 def test_unions_differences_and_complements_are_regions_again():
     low, left = Region("z < 1"), Region("x < 0")
     for region, expected in ((low | left, "101"), (low & left, "001"), (low - left, "100"), (~low, "010")):

@@ -190,6 +190,19 @@ def test_a_smooth_function_is_met_with_the_order_of_the_degree():
     assert errors[0] / errors[1] > 2.0**3.5  # spans of 1/8 and 1/16
 
 
+@pytest.mark.parametrize("control_points", [4, 5, 8, (5, 8, 13), 40])
+@pytest.mark.parametrize("ends", [(0.1, 1.0), (-0.3, 0.7), (1e6 + 0.1, 1e6 + 1.3)])
+def test_plane_faces_of_a_function_stay_in_their_planes_to_the_last_bit(control_points, ends):
+    a, b = ends
+    volume = BSplineVolume.from_function(
+        lambda u, v, w: (a * (1 - u) + b * u, a * (1 - v * v) + b * v * v, np.where(w == 1.0, b, a + 0.01 * w)),
+        control_points,
+    )
+    for axis in range(3):
+        across = np.moveaxis(volume.control_points[..., axis], axis, 0)
+        assert np.all(across[0] == a) and np.all(across[-1] == b)
+
+
 @pytest.mark.parametrize(
     ("function", "how", "says"),
     [

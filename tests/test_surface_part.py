@@ -57,6 +57,12 @@ def test_on_an_edge_and_at_a_corner_the_normal_decides(axis, side):
     assert np.all(CUBE[TRIANGLES[found]][:, :, axis] == side)
 
 
+@pytest.mark.parametrize("moved", [-1e-15, 0.0, 1e-15])
+def test_on_an_edge_without_a_normal_the_lowest_number_decides(moved):
+    points = np.array([[1.0 + moved, 0.25, 1.0 - moved], [1.0, 1.0 - moved, 1.0], [1.0 - moved, 1.0 + moved, 0.5]])
+    assert cube().nearest(points).tolist() == [2, 2, 7]
+
+
 def test_a_nearer_triangle_wins_over_a_better_normal():
     found = cube().nearest([[0.5, 0.5, 0.9], [0.9, 0.5, 0.95]], [[1.0, 0.0, 0.0]] * 2)
     assert np.all(CUBE[TRIANGLES[found]][:, :, 2] == 1.0)

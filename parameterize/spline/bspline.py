@@ -197,12 +197,19 @@ def apply_along(matrix: csr_array, field: Array, axis: int) -> Array:
 
 
 def interpolate_grid(knots: Sequence[Array], degree: int, values: Array) -> Array:
-    """Return the coefficients of the spline that has `values` (n_u, n_v, n_w, c) at the Greville points."""
+    """Return the coefficients of the spline that has `values` (n_u, n_v, n_w, c) at the Greville points.
+
+    Values at the ends, and values that are constant along a direction, are kept to the last bit: a plane face stays in
+    its plane.
+    """
     from scipy.interpolate import make_interp_spline
 
     for axis, row in enumerate(knots):
         moved = np.moveaxis(values, axis, 0)
-        values = np.moveaxis(make_interp_spline(greville(row, degree), moved, degree, row).c, 0, axis)
+        first = moved[:1]
+        found = first + make_interp_spline(greville(row, degree), moved - first, degree, row).c
+        found[[0, -1]] = moved[[0, -1]]
+        values = np.moveaxis(found, 0, axis)
     return values
 
 

@@ -16,6 +16,7 @@ from .groups import Groups
 
 NEAR = 1e-6  # of the box's diagonal: triangles whose distances differ by less are equally near
 THIN = 1e-6  # of the box's diagonal: the normal of a lower triangle is rounding
+TIED = 1e-9  # of the box's diagonal: the same where no normal is given, which could prefer a farther one
 AGREES = 1e-6  # a triangle is preferred where its cosine is larger by more than this
 SHARP = 30.0  # degrees
 # A triangle whose cosine with a point's normal is less than ASIDE belongs to another face of the part, if one that
@@ -68,14 +69,20 @@ class PartSurface(Brief):
 
         normals: (k, 3), of any length. Of triangles that are equally near, as on both sides of an edge, the one whose
         outward normal agrees best with the given one is taken; a triangle that is turned away by more than 60 degrees
-        only where none that agrees better is near, as beside the rim of a bore.
+        only where none that agrees better is near, as beside the rim of a bore. Without normals it is the one with the
+        lowest number.
         """
         where = np.ascontiguousarray(points, dtype=np.float64)
         squared, index, _ = self._tree.squared_distance(self.vertices, self.faces, where)
         found = np.asarray(index, dtype=np.int64).reshape(-1)
-        if normals is None or not len(where):
+        distance = np.sqrt(np.asarray(squared).reshape(-1))
+        if normals is None:
+            reach = distance + TIED * self._diagonal
+            rows = zip(where, reach, found.tolist(), strict=True)
+            return np.array([self._first(*row) for row in rows], dtype=np.int64)
+        if not len(where):
             return found
-        reach = np.sqrt(np.asarray(squared).reshape(-1)) + NEAR * self._diagonal
+        reach = distance + NEAR * self._diagonal
         given = np.ascontiguousarray(normals, dtype=np.float64)
         given = given / np.maximum(np.linalg.norm(given, axis=1, keepdims=True), np.finfo(np.float64).tiny)
         starts, around = self._around
@@ -86,6 +93,12 @@ class PartSurface(Brief):
             own = aside[cells == cell]
             best[own] = self._facing(where[own], given[own], best[own])
         return best
+
+    def _first(self, point: Array, reach: float, found: int) -> int:
+        """Return the lowest number of the triangles at the corners of one that lie within `reach` of a point (3,)."""
+        starts, around = self._around
+        near = {int(t) for corner in self.faces[found] for t in around[starts[corner] : starts[corner + 1]]}
+        return min((t for t in near if _distance(point, self.vertices, self.faces[t]) <= reach), default=found)
 
     def _facing(self, points: Array, normals: Array, best: IntArray) -> IntArray:
         """Return the triangles (k,) near points (k, 3) that face as normals (k, 3), all much alike; else `best`."""

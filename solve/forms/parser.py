@@ -44,16 +44,19 @@ FUNCTIONS: dict[str, Callable[[Jet], Jet]] = {
     "abs": abs,
 }
 CHOICES = {"min": 2, "max": 2, "where": 3}  # functions that choose among values -> number of their arguments
-COMPARISONS: dict[type[ast.cmpop], Callable[[Any, Any], Any]] = {
-    ast.Lt: operator.lt,
-    ast.LtE: operator.le,
-    ast.Gt: operator.gt,
-    ast.GtE: operator.ge,
+Comparison = Callable[[Any, Any, Any], Any]
+LEAST = 1e-3  # of a tolerance: "x < 1e-9", which means x = 0, holds there on bodies of any usual size
+COMPARISONS: dict[type[ast.cmpop], Comparison] = {  # of two numbers and their tolerance
+    ast.Lt: lambda a, b, near: a < b - LEAST * near,
+    ast.LtE: lambda a, b, near: a <= b + near,
+    ast.Gt: lambda a, b, near: a > b + LEAST * near,
+    ast.GtE: lambda a, b, near: a >= b - near,
 }
 
 Values = Sequence[Any]  # of the variables, jets; where conditions have names, Boolean arrays of these after them
 Evaluator = Callable[[Values], Jet]
 Decider = Callable[[Values], Any]  # gives Boolean arrays
+Tolerance = Callable[[Jet, Jet], Any]  # of two numbers that are compared
 
 
 class ExpressionError(ValueError):
@@ -146,14 +149,21 @@ def _shorten(text: str, length: int = 40) -> str:
 class Translator:
     """Translate a text into nested closures, and refuse every construct that is not on the list.
 
-    variables: the names of numbers. marks: the names of conditions. used: the names that occur. chooses: whether where,
-    min or max occurs. Raises ExpressionError, here and in `number` and `condition`, for a refused construct.
+    variables: the names of numbers. marks: the names of conditions. near: the tolerance with which a condition compares
+    two numbers; without it they are compared to the last bit. used: the names that occur. chooses: whether where, min
+    or max occurs. Raises ExpressionError, here and in `number` and `condition`, for a refused construct.
     """
 
-    def __init__(self, text: str, variables: Sequence[str] = VARIABLES, marks: Sequence[str] = ()) -> None:
+    def __init__(
+        self,
+        text: str,
+        variables: Sequence[str] = VARIABLES,
+        marks: Sequence[str] = (),
+        near: Tolerance = lambda a, b: 0.0,
+    ) -> None:
         if not isinstance(text, str):
             raise ExpressionError(f"an expression must be text, got {type(text).__name__}")
-        self.text, self.variables, self.marks = text.strip(), variables, marks
+        self.text, self.variables, self.marks, self.near = text.strip(), variables, marks, near
         self.used: set[str] = set()
         self.chooses = False
         if not self.text:
@@ -242,10 +252,15 @@ class Translator:
             case ast.Compare(ops=ops) if all(type(op) in COMPARISONS for op in ops):
                 sides = [self._node(side, depth + 1) for side in (node.left, *node.comparators)]
                 tests = [COMPARISONS[type(op)] for op in ops]
-                return lambda p: _all_hold(tests, [side(p).value for side in sides])
+                return lambda p: self._all_hold(tests, [side(p) for side in sides])
             case ast.Compare():
                 raise self._refuse(node, "conditions compare with <, <=, > and >=: surfaces are not met exactly")
         raise self._refuse(node, "is a number, where a condition must stand, such as z < 1 or nx > 0.9")
+
+    def _all_hold(self, tests: Sequence[Comparison], sides: Sequence[Jet]) -> Any:
+        """Return whether each number and the next satisfy the comparison between them, as in 0 < x < 1."""
+        pairs = zip(tests, pairwise(sides), strict=True)
+        return functools.reduce(np.logical_and, [test(a.value, b.value, self.near(a, b)) for test, (a, b) in pairs])
 
     def _number(self, node: ast.Constant, value: Any) -> Evaluator:
         if type(value) not in (int, float):
@@ -294,11 +309,6 @@ class Translator:
             return lambda p: left(p).power(exponent)
         combine = OPERATORS[type(node.op)]
         return lambda p: combine(left(p), right(p))
-
-
-def _all_hold(tests: Sequence[Callable[[Any, Any], Any]], sides: Sequence[Any]) -> Any:
-    """Return whether each number and the next satisfy the comparison between them, as in 0 < x < 1."""
-    return functools.reduce(np.logical_and, [test(*pair) for test, pair in zip(tests, pairwise(sides), strict=True)])
 
 
 def _chosen(condition: Any, a: Jet, b: Jet) -> Jet:

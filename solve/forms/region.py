@@ -16,7 +16,7 @@ from parameterize.arrays import Array, IntArray
 from parameterize.spline.volume import FACE_NAMES
 
 from .frame import UnitFrame
-from .jets import Jet
+from .jets import Jet, coordinates
 from .parser import SCALED, VARIABLES, Decider, ExpressionError, Translator, scaled
 
 NORMAL = ("nx", "ny", "nz")
@@ -24,6 +24,10 @@ CALL = re.compile(r"\b(face|box)\s*\(([^()]*)\)")
 PATCH_FACE = re.compile(r"\bp\d+_[uvw][01]\b")
 GROUP = re.compile(r"""group:("[^"]*"|'[^']*'|[^\s()]+)""")
 ANGLE = 30.0  # degrees between neighbouring triangles beyond which an edge is sharp
+# The tolerance of positions, of the diagonal of the points' box, and of the components of normals: rounding is some
+# 1e-15, and a spline is seldom closer to its part than 1e-6. Far from the origin rounding is that of the coordinates:
+# the diagonal counts as no less than FAR of the largest.
+TOLERANCE, FAR = 1e-9, 4e-3
 
 Mask = NDArray[np.bool_]
 
@@ -51,6 +55,9 @@ class Part(Protocol):
 @dataclass(frozen=True)
 class Region:
     """A part of the solid's boundary: where a condition on the position and the outward normal holds.
+
+    The last bits of a point do not decide to which region it belongs: `<=`, `>=` and `box` hold up to 1e-9 of the
+    diagonal of the points beyond their bound, `<` and `>` from 1e-12 of it on.
 
     Parameters
     ----------
@@ -99,7 +106,7 @@ class Region:
         text = PATCH_FACE.sub(lambda found: mark("patch", found[0]), text)
         names = [f"_mark{i}" if i >= len(FACE_NAMES) else name for i, name in enumerate(marks)]
         try:
-            translator = Translator(text, (*VARIABLES, *NORMAL), names)
+            translator = Translator(text, (*VARIABLES, *NORMAL), names, _change)
             decide = translator.condition()
             for entry in marks[len(FACE_NAMES) :]:
                 _check_mark(entry)
@@ -172,7 +179,8 @@ class Region:
         ExpressionError where X, Y, Z occur without a frame, ValueError where the surface lacks a face or group.
         """
         x, normal = np.asarray(x), np.asarray(normal)
-        jets = [Jet(row, (), ()) for row in x]
+        near = _tolerance(x)
+        jets = _moved(x, near)
         if self.is_scaled and self.frame is None:
             raise ExpressionError(f"region {self.text!r:.80}: X, Y, Z mean nothing without a volume")
         of_frame = scaled(self.frame, jets) if self.frame is not None else jets
@@ -180,17 +188,17 @@ class Region:
         if self.surface is not None and not self._used.isdisjoint((*NORMAL, *self._of_part)):
             nearest = self.surface.nearest(x.reshape(3, -1).T, normal.reshape(3, -1).T).reshape(x.shape[1:])
             normal = np.moveaxis(self.surface.normals[nearest], -1, 0)
-        values: list[Any] = [*jets, *of_frame, *(Jet(row, (), ()) for row in normal)]
+        values: list[Any] = [*jets, *of_frame, *_moved(normal, TOLERANCE)]
         shape = x.shape[1:]
         values += [np.full(shape, face.endswith(name)) for name in FACE_NAMES]
-        values += [self._marked(entry, x, nearest, face) for entry in self._marks[len(FACE_NAMES) :]]
+        values += [self._marked(entry, x, near, nearest, face) for entry in self._marks[len(FACE_NAMES) :]]
         with np.errstate(all="ignore"):
             return np.broadcast_to(np.asarray(self._decide(values), dtype=bool), shape)
 
-    def _marked(self, entry: str, x: Array, nearest: IntArray | None, face: str) -> Mask:
+    def _marked(self, entry: str, x: Array, near: float, nearest: IntArray | None, face: str) -> Mask:
         """Return the mask (...) of the points that lie on a patch's face, in a box, or in a group or face of the part.
 
-        nearest: (...), the nearest triangle of the part for each point.
+        near: the tolerance of positions. nearest: (...), the nearest triangle of the part for each point.
         """
         kind, argument = entry.split(" ", 1)
         if kind == "patch":
@@ -198,7 +206,7 @@ class Region:
         if kind == "box":
             low, high = np.sort(np.reshape(_numbers(argument), (2, 3)), axis=0)
             sides = (slice(None), *[None] * (x.ndim - 1))
-            inside: Mask = np.all((x >= low[sides]) & (x <= high[sides]), axis=0)
+            inside: Mask = np.all((x >= low[sides] - near) & (x <= high[sides] + near), axis=0)
             return inside
         if nearest is None:
             raise ValueError(
@@ -224,6 +232,25 @@ def regions_of(given: Region | str | Sequence[Region | str]) -> list[Region]:
     if isinstance(given, str) or not isinstance(given, Sequence):
         return [Region(given)]
     return [region for entry in given for region in regions_of(entry)]
+
+
+def _tolerance(x: Array) -> float:
+    """Return the tolerance of the positions of points (3, ...), a length; 0 where one of them is not finite."""
+    points = x.reshape(3, -1)
+    if not points.size or not np.all(np.isfinite(points)):
+        return 0.0
+    return TOLERANCE * max(float(np.linalg.norm(np.ptp(points, axis=1))), FAR * float(np.abs(points).max()))
+
+
+def _moved(rows: Array, step: float) -> list[Jet]:
+    """Return the jets of three coordinates (3, ...) whose gradient is the change along a step in each direction."""
+    return [replace(jet, gradient=tuple(step * slope for slope in jet.gradient)) for jet in coordinates(rows)]
+
+
+def _change(a: Jet, b: Jet) -> Any:
+    """Return by how much a difference of two numbers changes where a point moves by the tolerance."""
+    slopes = [np.abs(slope) for slope in (a - b).gradient]
+    return np.nan_to_num(sum(slopes), nan=0.0, posinf=0.0)  # of a root at zero the slope is no number
 
 
 def _numbers(argument: str) -> list[float]:
