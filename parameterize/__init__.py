@@ -27,6 +27,10 @@ The names below are loaded on first use. Only `parameterize` and `Parameterizati
 from importlib import import_module
 from typing import Any
 
+from .kernel_cache import provide_folder
+
+provide_folder()  # before the first module with kernels is loaded
+
 _HOME = {  # type checkers read __init__.pyi
     "BSplineVolume": "spline.volume",
     "BodyCertificate": "certificate.body",

@@ -7,7 +7,12 @@ from typing import Any
 
 from numba.core import event
 
+from .kernel_cache import FOLDER, are_kept
+
 log = logging.getLogger(__name__)
+
+KEPT = ", on the first use alone; they are kept"
+NOT_KEPT = f" in every run: neither the installation nor your cache can be written; let {FOLDER} name a folder"
 
 
 class _Teller(event.Listener):  # type: ignore[misc]
@@ -20,7 +25,7 @@ class _Teller(event.Listener):  # type: ignore[misc]
         """Tell that a kernel is not in the cache."""
         if not self._has_told:
             self._has_told = True
-            log.info("compiling kernels: some seconds, on the first use alone; they are kept")
+            log.info("compiling kernels: some seconds%s", KEPT if are_kept() else NOT_KEPT)
 
     def on_end(self, event: Any) -> None:
         """Do nothing."""

@@ -9,7 +9,7 @@ import pytest
 
 import iga_nn
 import solve.solver
-from parameterize import compilation
+from parameterize import compilation, kernel_cache
 from solve.study import benchmark_volume
 
 KERNEL = """
@@ -61,6 +61,15 @@ def test_several_kernels_are_told_of_once(tmp_path, monkeypatch, told):
         with compilation.compilation_told():
             kernel(value)
     assert told() == ["compiling kernels: some seconds, on the first use alone; they are kept"]
+
+
+def test_kernels_in_a_temporary_folder_are_said_not_to_be_kept(tmp_path, monkeypatch, told):
+    (tmp_path / "a_kernel.py").write_text(KERNEL)
+    monkeypatch.setenv(kernel_cache.FOLDER, str(tmp_path / f"{kernel_cache.PREFIX}1"))
+    kernel = loaded(tmp_path, monkeypatch)
+    with compilation.compilation_told():
+        kernel(1)
+    assert "in every run: neither the installation nor your cache can be written" in told()[0]
 
 
 def test_a_solve_with_kernels_on_disk_tells_nothing(told):
