@@ -26,7 +26,7 @@ Found = Solution | MultiPatchSolution
 
 SOLUTION = "solution.npz"
 _CHECKPOINT = "solve"
-_MESHES = ("refine", "unit", "stress_unit")  # options that change no number of a level
+_FREE = ("refine", "unit", "stress_unit", "solve_anyway")  # options that change no number of a level
 
 
 @dataclass
@@ -71,7 +71,7 @@ class KeptLevels:
     def _asked(self) -> dict[str, Any]:
         """Return the options on which the numbers of a level depend, as plain JSON values."""
         options = asdict(self.statement).items()
-        return {name: reports.plain(value) for name, value in options if name not in _MESHES}
+        return {name: reports.plain(value) for name, value in options if name not in _FREE}
 
     def save(self, done: Levels) -> None:
         """Keep the levels whose finest solution the output folder holds."""

@@ -252,7 +252,7 @@ def has_checkpoint(folder: Path) -> bool:
 def _way_on(folder: Path) -> str:
     """Return in words what is done, and how to continue after an interruption."""
     if has_checkpoint(folder):
-        return f"the same command with --resume goes on from {_last_kept(folder)}"
+        return f"the same command with --resume continues from {_last_kept(folder)}"
     report = reports.read(folder) or {}
     if levels := reports.solved(report).get("levels"):
         return f"{len(levels)} level{'s' * (len(levels) > 1)} done, in {folder / REPORT}"
