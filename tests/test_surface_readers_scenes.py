@@ -1,4 +1,4 @@
-"""glTF, 3MF and archives: places of nodes and components, units, groups."""
+"""glTF and archives: places of nodes, units, groups."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import trimesh
 from mesh_files import CUBE, TRIANGLES, obj
-from scene_files import glb, gltf, model, threemf, zipped
+from scene_files import glb, gltf, zipped
 
 from parameterize.surface.surface import MeshError, load_surface
 
@@ -107,24 +107,6 @@ def test_a_missing_file_of_a_gltf_is_named_and_large_ones_stop_at_the_limit(tmp_
         stream.truncate(70 << 20)  # sparse: takes no disk
     with pytest.raises(MeshError, match="take more than the limit"):
         read(tmp_path, "cube.gltf", gltf(beside="a.bin")[0], max_faces=12)
-
-
-def test_components_and_items_of_a_3mf_have_their_places_and_the_unit_is_kept(tmp_path):
-    surface = read(tmp_path, "cube.3mf", threemf())
-    assert surface.volume == pytest.approx(8.0) and surface.unit == surface.summary()["unit"] == "in"
-    assert np.allclose(surface.bbox, [[5, 0, 0], [7, 2, 2]]) and list(surface.groups) == ["block"]
-    turned = '<item objectid="2" transform="0 1 0 -1 0 0 0 0 1 0 0 10"/>'  # rows: x goes to y, y to -x
-    assert np.allclose(read(tmp_path, "cube.3mf", threemf(model(build=turned))).bbox, [[-2, 5, 10], [0, 7, 12]])
-
-
-def test_supports_are_left_out_and_other_parts_are_found(tmp_path):
-    more = '<object id="3" type="support"><components><component objectid="1"/></components></object>'
-    surface = read(tmp_path, "cube.3mf", threemf(model(build='<item objectid="1"/><item objectid="3"/>', more=more)))
-    assert surface.volume == pytest.approx(1.0) and surface.notices == ("left out 1 supports",)
-    production = 'xmlns:p="http://schemas.microsoft.com/3dmanufacturing/production/2015/06"'
-    start = model(build=f'<item objectid="1" {production} p:path="/3D/parts/block.model"/>', faces=[])
-    members = {"3D/3dmodel.model": start, "3D/parts/block.model": model(build="")}
-    assert read(tmp_path, "cube.3mf", zipped(members)).volume == pytest.approx(1.0)
 
 
 def test_an_archive_of_zeros_stops_at_the_limit(tmp_path):

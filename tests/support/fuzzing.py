@@ -37,6 +37,7 @@ import formulas
 import meshio
 import numpy as np
 import pyvista
+import threemf_files
 from bodies import exact_ring
 from foreign_files import geopdes, geopdes_07, mfem_patches
 from mesh_files import (
@@ -421,6 +422,14 @@ def scene_readers():
         "gltf, beside", ".zip", check, (beside,), lambda both: zipped(dict(zip(("a.gltf", "a.bin"), both, strict=True)))
     )
     yield Reader("3mf", ".3mf", check, ([model()],), lambda pieces: threemf(pieces[0]))
+    yield Reader(
+        "3mf, parts",
+        ".3mf",
+        check,
+        ([piece.encode() for piece in threemf_files.PIECES.values()],),
+        lambda pieces: threemf_files.archive(dict(zip(threemf_files.PIECES, pieces, strict=True))),
+    )
+    yield Reader("3mf, bytes", ".3mf", check, ([threemf_files.package()],))
     yield Reader("zip", ".zip", check, ([obj().encode()],), lambda pieces: zipped({"a/cube.obj": pieces[0]}))
     yield Reader("zip, bytes", ".zip", check, ([zipped({"cube.stl": binary_stl(), "b.txt": "b"})],))
     for suffix in (".step", ".iges"):

@@ -7,6 +7,7 @@ from base64 import b64encode
 
 import numpy as np
 from mesh_files import CUBE, TRIANGLES
+from threemf_files import package
 
 
 def gltf(vertices=CUBE, faces=TRIANGLES, nodes=None, primitive=None, inside=True, beside="", **more):
@@ -69,7 +70,7 @@ def zipped(members):
 
 
 def threemf(content=None):
-    return zipped({"3D/3dmodel.model": model() if content is None else content})
+    return package(model() if content is None else content)
 
 
 def solid_model(kind="step", unit="MM"):

@@ -4,6 +4,7 @@ import gzip
 import struct
 
 import numpy as np
+import threemf_files
 from mesh_files import (
     CUBE,
     MIXED,
@@ -45,6 +46,8 @@ ACCEPTED = {
     "inside.gltf": (gltf(inside=False)[0], None),
     "mirrored.glb": (glb(gltf(nodes=[{"mesh": 0, "scale": [1, 1, -1], "translation": [0, 0, 1]}])), None),
     "model.3mf": (threemf(model(build='<item objectid="1"/>', unit="meter")), None),
+    "parts.3mf": (threemf_files.archive(threemf_files.PIECES), "left out 1 objects of type support"),
+    "unnamed.3mf": (threemf_files.archive({"3D/a.model": threemf_files.model()}), "read its only model, '3D/a.model'"),
     "packed.zip": (
         zipped({"parts/cube.obj": obj(), "__MACOSX/._cube.obj": "x", "readme.txt": "a cube"}),
         "unpacked 'parts/cube.obj' from .zip",
@@ -110,7 +113,19 @@ REFUSED = {
     "range.glb": (glb(gltf(faces=TRIANGLES + 1)), "vertex numbers out of range"),
     "points.glb": (glb(gltf(primitive={"mode": 0})), "has no triangles"),
     "empty.3mf": (threemf(model(build="")), "builds no triangles"),
-    "lost.3mf": (threemf(model(build='<item objectid="9"/>')), "builds an object '9' that it does not have"),
+    "lost.3mf": (threemf(model(build='<item objectid="9"/>')), "builds object 9 of '3D/3dmodel.model', which it does"),
+    "required.3mf": (
+        threemf(threemf_files.model(more='requiredextensions="x"')),
+        "requires an extension that is not read, 'http://example.org/x'",
+    ),
+    "boolean.3mf": (
+        threemf(threemf_files.model(threemf_files.thing(content='<bo:booleanshape objectid="1"/>'))),
+        "object 1 of the 3MF has a shape that is not read, boolean operations",
+    ),
+    "models.3mf": (
+        threemf_files.archive({"_rels/.rels": threemf_files.relationships("/a.model", "/b.model")}),
+        "has 2 3D models (/a.model, /b.model) by /_rels/.rels",
+    ),
     "unit.3mf": (threemf(model(unit="mile")), "the unit 'mile' is none of"),
     "cut.3mf": (threemf()[:-30], "not a whole archive"),
     "entities.3mf": (threemf(b"<!DOCTYPE a [<!ENTITY b 'c'>]>" + model()), "declares a document type"),

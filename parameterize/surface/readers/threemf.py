@@ -1,165 +1,169 @@
-"""3MF: the triangles of all items that are built, in their places. Objects are groups by their names.
+"""3MF: the triangles of all items that are built, in their places. Objects and sets of triangles are groups.
 
-(3MF Consortium, "3D Manufacturing Format, Core Specification" 1.3; components in other parts of the archive follow the
-production extension.)
+(3MF Consortium, "Core Specification" 1.3, 3.4.3 and 4; components in other parts: "Production Extension" 1.2.)
 """
 
-import posixpath
-from dataclasses import dataclass, field
-from typing import Any
-from xml.etree import ElementTree
+from collections import Counter
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ...arrays import Array
 from ..errors import MeshError, check_face_count
 from ..groups import gathered
 from .archive import Archive
-from .common import DAMAGED, Content, coordinates, most_bytes
+from .common import DAMAGED, Content, most_bytes
+from .threemf_extensions import makes_another_body, name_of
+from .threemf_model import FULL, Model, Object, Reference, read_model
+from .threemf_package import Package
+from .threemf_slicers import check_notes
 
 UNITS = {"micron": "micron", "millimeter": "mm", "centimeter": "cm", "inch": "in", "foot": "ft", "meter": "m"}
 DEEPEST = 20  # components in components
 MOST_OBJECTS = 10_000  # each counted as often as it is built
-START = "3D/3dmodel.model"
-SUPPORTS = ("support", "solidsupport")
-
-
-@dataclass
-class _Object:
-    """An object of a model: a mesh, or components, each a part's name, an object and its place."""
-
-    name: str
-    kind: str
-    points: list[list[float]] = field(default_factory=list)
-    faces: list[list[int]] = field(default_factory=list)
-    components: list[tuple[str, str, Array]] = field(default_factory=list)
-
-
-@dataclass
-class _Model:
-    """The target of an XML parser that keeps objects and items, and no tree."""
-
-    unit: str = "millimeter"
-    objects: dict[str, _Object] = field(default_factory=dict)
-    items: list[tuple[str, str, Array]] = field(default_factory=list)
-    _open: _Object | None = None
-
-    def start(self, tag: str, given: dict[str, str]) -> None:
-        """Take an element by its name without the namespace."""
-        name = tag.rpartition("}")[2]
-        if name == "vertex" and self._open:
-            self._open.points.append(coordinates([given.get(axis, "") for axis in "xyz"], len(self._open.points)))
-        elif name == "triangle" and self._open:
-            self._open.faces.append([_whole(given.get(corner, "")) for corner in ("v1", "v2", "v3")])
-        elif name == "object":
-            self._open = _Object(given.get("name", ""), given.get("type", "model"))
-            self.objects[given.get("id", "")] = self._open
-        elif name == "component" and self._open:
-            self._open.components.append(_reference(given))
-        elif name == "item":
-            self.items.append(_reference(given))
-        elif name == "model":
-            self.unit = given.get("unit", self.unit)
-
-    def end(self, tag: str) -> None:
-        """Close an object."""
-        if tag.rpartition("}")[2] == "object":
-            self._open = None
-
-    def close(self) -> "_Model":
-        """Return the model."""
-        return self
-
-
-def _whole(word: str) -> int:
-    if not (word.isascii() and word.isdigit()) or len(word) > 18:
-        raise MeshError(f"a triangle of the 3MF needs vertex numbers, got {word[:20]!r}; {DAMAGED}")
-    return int(word)
-
-
-def _reference(given: dict[str, str]) -> tuple[str, str, Array]:
-    """Return the part, the object's number and the place (4, 3), rows of an affine map, of a component or an item."""
-    words = given.get("transform", "1 0 0 0 1 0 0 0 1 0 0 0").split()
-    rows = [coordinates(words[i : i + 3], 0) for i in range(0, 12, 3)]
-    path = next((value for name, value in given.items() if name.rpartition("}")[2] == "path"), "")
-    return path.lstrip("/"), given.get("objectid", ""), np.array(rows)
-
-
-class _Reader:
-    """The models of an archive, and what is built of them."""
-
-    def __init__(self, archive: Archive, max_faces: int) -> None:
-        self._archive, self._max_faces, self._models = archive, max_faces, dict[str, _Model]()
-        self.points, self.faces = [np.empty((0, 3))], list[list[int]]()
-        self.named: list[tuple[str, Any]] = []
-        self.supports = self._built = 0
-
-    def model(self, part: str) -> _Model:
-        """Return the model of a part of the archive."""
-        if part not in self._models:
-            data = self._archive.read(part)
-            if b"<!DOCTYPE" in data or b"<!ENTITY" in data:
-                raise MeshError("the 3MF declares a document type, whose entities are not expanded: export it again")
-            try:
-                self._models[part] = _parsed(data)
-            except (ElementTree.ParseError, ValueError, LookupError) as error:
-                if isinstance(error, MeshError):
-                    raise
-                raise MeshError(f"not readable as 3MF ({error}); {DAMAGED}") from None
-        return self._models[part]
-
-    def build(self, part: str, number: str, place: Array, depth: int) -> None:
-        """Take the mesh of an object and those of its components. place: (4, 3)."""
-        found = self.model(part).objects.get(number)
-        self._built += 1
-        if self._built > MOST_OBJECTS:
-            raise MeshError(f"the 3MF builds more than {MOST_OBJECTS} objects: export the one to compute with")
-        if found is None or depth > DEEPEST:
-            raise MeshError(f"the 3MF builds an object {number[:20]!r} that it does not have; {DAMAGED}")
-        if found.kind in SUPPORTS:
-            self.supports += 1
-            return
-        first, below = len(self.faces), sum(map(len, self.points))
-        check_face_count(first + len(found.faces), self._max_faces)
-        if found.points:
-            with np.errstate(all="ignore"):  # what is not finite is refused later
-                self.points.append(np.array(found.points) @ place[:3] + place[3])
-                inverted = np.linalg.det(place[:3]) < 0
-            rows = (row[::-1] if inverted else row for row in found.faces)
-            for row in rows:
-                if max(row) >= len(found.points):
-                    raise MeshError(f"vertex number {max(row)} where there are {len(found.points)} vertices; {DAMAGED}")
-                self.faces.append([corner + below for corner in row])
-        for path, inner, where in found.components:
-            with np.errstate(all="ignore"):
-                there = np.concatenate([where[:3] @ place[:3], where[3:] @ place[:3] + place[3]])
-            self.build(path or part, inner, there, depth + 1)
-        if found.name or found.points:
-            self.named.append((found.name or f"object {number}", np.arange(first, len(self.faces))))
-
-
-def _parsed(data: bytes) -> _Model:
-    model = _Model()
-    parser = ElementTree.XMLParser(target=model)  # noqa: S314 - it has no entities
-    parser.feed(data)
-    parser.close()
-    return model
+POINT_BYTES = 24
+SOLID = "model"
+# No part of the body: scaffolds, and sheets that the specification forbids to fill.
+LEFT_OUT = ("support", "solidsupport", "surface")
+SHOWN = 3  # elements in a notice
 
 
 def read_3mf(data: bytes, max_faces: int) -> Content:
     """Read a .3mf."""
-    archive = Archive(data, most_bytes(max_faces))
-    known = {name.lower(): name for name in archive.names}
-    start = known.get(START.lower()) or next((known[name] for name in known if name.endswith(".model")), None)
-    if start is None:
-        raise MeshError("the archive has no 3D model: export it as 3MF again")
-    reader = _Reader(archive, max_faces)
-    model = reader.model(start)
-    if model.unit not in UNITS:
-        raise MeshError(f"the unit {model.unit[:20]!r} is none of {', '.join(UNITS)}: export it again")
-    for path, number, place in model.items:
-        reader.build(posixpath.normpath(path) if path else start, number, place, 0)
-    if not reader.faces:
-        raise MeshError("the 3MF builds no triangles: export the surface again")
-    notices = (f"left out {reader.supports} supports",) * bool(reader.supports)
-    return Content(np.concatenate(reader.points), reader.faces, notices, gathered(reader.named), UNITS[model.unit])
+    package = Package(Archive(data, most_bytes(max_faces)))
+    root, notices = package.model()
+    check_notes(package)
+    built = _Built(package, root, max_faces)
+    built.take_items()
+    notices += tuple(built.notices())
+    if not built.faces:
+        why = f" ({'; '.join(notices)})" if notices else ""
+        raise MeshError(f"the 3MF builds no triangles{why:.300}: export the surface again")
+    return Content(np.concatenate(built.points), built.faces, notices, gathered(built.named), built.unit)
+
+
+class _Built:
+    """The triangles of the items of a package's model, and what was left out of them."""
+
+    def __init__(self, package: Package, root: str, max_faces: int) -> None:
+        self._package, self._root, self._max_faces = package, root, max_faces
+        self._models: dict[str, Model] = {}
+        self._count = self._point_count = 0
+        self._left_out = Counter[str]()
+        self._foreign = set[str]()
+        self.points, self.faces = [np.empty((0, 3))], list[list[int]]()
+        self.named: list[tuple[str, ArrayLike]] = []
+
+    @property
+    def unit(self) -> str:
+        """Return the unit of all points, that of the root model."""
+        return UNITS[self._models[self._root].unit]
+
+    def take_items(self) -> None:
+        """Take the items of the root model; those of other models are not built."""
+        root = self._model(self._root)
+        self._foreign |= root.foreign
+        for item in root.items:
+            self._take(self._root, item, np.eye(4, 3), 0)
+
+    def notices(self) -> list[str]:
+        """Return one line each on what was left out or changed."""
+        root = self._models[self._root]
+        lines = [line for model in self._models.values() for line in model.notices]
+        lines += [f"left out {count} objects of type {kind}" for kind, count in self._left_out.items()]
+        if root.skipped:
+            lines.append(f"left out {root.skipped} items that a slicer marked as not printable")
+        if self._foreign:
+            shown = ", ".join(tag[:100] for tag in sorted(self._foreign)[:SHOWN])
+            lines.append(f"left out {len(self._foreign)} kinds of elements that are not read: {shown}")
+        return lines
+
+    def _model(self, part: str) -> Model:
+        """Return the model of a part, which has the unit of the root: of another one readers think differently."""
+        if part not in self._models:
+            model = read_model(self._package.read(part))
+            if model.unit not in UNITS:
+                raise MeshError(f"the unit {model.unit[:20]!r} is none of {', '.join(UNITS)}: export it again")
+            unit = self._models.get(self._root, model).unit
+            if model.unit != unit:
+                raise MeshError(f"{part!r:.80} is in {model.unit}, its model in {unit}: export the 3MF in one unit")
+            self._models[part] = model
+        return self._models[part]
+
+    def _take(self, part: str, reference: Reference, outer: Array, depth: int) -> None:
+        """Take the object that an item or a component of a part refers to. outer: (4, 3), of what it stands in."""
+        self._count += 1
+        if self._count > MOST_OBJECTS:
+            raise MeshError(f"the 3MF builds more than {MOST_OBJECTS} objects: export the one to compute with")
+        if depth > DEEPEST:
+            raise MeshError(f"components of the 3MF are more than {DEEPEST} deep, or a part of themselves; {DAMAGED}")
+        if reference.path and part != self._root:
+            raise MeshError(
+                f"the part {part!r:.80} refers to another part, which only the model may do: export it again"
+            )
+        place = _combined(reference.place, outer)
+        there = self._package.find(reference.path) if reference.path else part
+        made = self._model(there).objects.get(reference.number)
+        if made is None:
+            raise MeshError(
+                f"the 3MF builds object {reference.number} of {there!r:.80}, which it does not have; {DAMAGED}"
+            )
+        if made.content == "mesh" and made.kind in LEFT_OUT:
+            self._left_out[made.kind] += 1
+            return
+        _check_shape(made)
+        first = len(self.faces)
+        for component in made.components:
+            self._take(there, component, place, depth + 1)
+        self._take_mesh(made, place)
+        self._foreign |= made.foreign
+        if made.name or made.content == "mesh":
+            self.named.append((made.name or f"object {made.number}", np.arange(first, len(self.faces))))
+
+    def _take_mesh(self, made: Object, place: Array) -> None:
+        """Take a mesh at its place (4, 3). A mirrored body keeps its volume's sign (Core Specification, 3.3)."""
+        check_face_count(len(self.faces) + len(made.faces), self._max_faces)
+        most = most_bytes(self._max_faces) // POINT_BYTES
+        first_point, first_face = self._point_count, len(self.faces)
+        self._point_count += len(made.points)
+        if self._point_count > most:
+            raise MeshError(f"the 3MF builds more than {most} vertices: export the one object to compute with")
+        rows = np.array(made.faces, dtype=np.int64).reshape(-1, 3)
+        if rows.max(initial=-1) >= len(made.points):
+            raise MeshError(f"vertex number {rows.max()} where there are {len(made.points)} vertices; {DAMAGED}")
+        with np.errstate(all="ignore"):  # what is not finite is refused later
+            self.points.append(np.array(made.points).reshape(-1, 3) @ place[:3] + place[3])
+            if np.linalg.det(place[:3]) < 0:
+                rows = rows[:, ::-1]
+        self.faces += (rows + first_point).tolist()
+        self.named += [(name, first_face + np.array(numbers, dtype=np.int64)) for name, numbers in made.sets]
+
+
+def _combined(inner: Array, outer: Array) -> Array:
+    """Return the place (4, 3) of what stands at `inner` in what stands at `outer`."""
+    with np.errstate(all="ignore"):
+        return np.concatenate([inner[:3] @ outer[:3], inner[3:] @ outer[:3] + outer[3]])
+
+
+def _check_shape(made: Object) -> None:
+    """Raise MeshError for an object that is built and whose shape is not that of its mesh or components."""
+    for tag in sorted(made.foreign):
+        if makes_another_body(tag):
+            namespace = tag[1:].rpartition("}")[0]
+            raise MeshError(
+                f"object {made.number} of the 3MF has a shape that is not read, {name_of(namespace)}: "
+                "export it as a mesh"
+            )
+    if not made.content:
+        held = ", ".join(sorted(made.foreign))[:200] or "nothing"
+        raise MeshError(f"object {made.number} of the 3MF has no mesh, it holds {held}: export it as a mesh")
+    if made.content == "mesh" and made.kind != SOLID:
+        raise MeshError(
+            f"the 3MF builds object {made.number} of type {made.kind[:20]!r}, which is no part of a body: "
+            "leave it out, or export it as a model"
+        )
+    if made.resolution != FULL:
+        raise MeshError(
+            f"the mesh of object {made.number} of the 3MF is an image of the body ({made.resolution[:20]!r}): "
+            "export it in full resolution"
+        )
