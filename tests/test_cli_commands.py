@@ -100,11 +100,16 @@ def test_finished_output_is_left_alone_unless_forced(formula_training, in_folder
     assert Path("cube/volume.npz").stat().st_mtime_ns > before
 
 
-def test_folded_map_is_solved_with_a_warning_and_exit_code_3(formula_training, in_folder, capsys):
-    formula_training(amplitude=0.4)
+def test_a_folded_map_is_solved_if_asked_alone_with_a_warning_and_exit_code_3(formula_training, in_folder, capsys):
+    formula_training(amplitude=0.35)
     assert main(["run", "poisson", "cube", "--refine", "0"]) == 3
+    out, err = capsys.readouterr()
+    assert out.startswith("NOT SOLVED       the map folds; --solve-anyway solves on it all the same\n")
+    assert err.count("nothing is solved: the map folds") == 1 and not Path("cube/solution.npz").exists()
+    assert main(["run", "poisson", "cube", "--refine", "0", "--resume"]) == 3  # finished so
+    assert main(["run", "poisson", "cube", "--refine", "0", "--solve-anyway", "--force"]) == 3
     report = json.loads(Path("cube/report.json").read_text())
-    assert report["parameterization"]["bijective"] == "folded"
+    assert report["parameterization"]["bijective"] == "folded" and "not_solved" not in report
     assert "not certified" in report["poisson"]["notices"][0]
     assert report["poisson"]["levels"][0]["l2"] > 0.0
     assert Path("cube/solution.npz").exists()

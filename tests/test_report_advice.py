@@ -89,7 +89,7 @@ def test_a_surface_that_crosses_itself_is_the_first_suspect():
 
 @pytest.mark.pictures
 def test_a_folded_run_ends_with_places_advice_and_a_picture(formula_training, in_folder, capsys):
-    formula_training(amplitude=0.4)
+    formula_training(amplitude=0.38)
     assert main(["parameterize", "cube", "--out", "out"]) == 3
     out = capsys.readouterr().out
     assert "not proved       on " in out and "try              more control points" in out
@@ -103,7 +103,7 @@ def test_a_folded_run_ends_with_places_advice_and_a_picture(formula_training, in
 
 
 def test_json_has_places_and_advice(formula_training, in_folder, capsys):
-    formula_training(amplitude=0.4)
+    formula_training(amplitude=0.38)
     assert main(["parameterize", "cube", "--out", "out", "--json", "--quiet"]) == 3
     verdict = json.loads(capsys.readouterr().out)
     assert verdict["unproved"]["places"] and any("--seed" in line for line in verdict["advice"])

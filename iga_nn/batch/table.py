@@ -26,7 +26,7 @@ log = logging.getLogger(__name__)
 
 SCHEMA = 1
 
-State = Literal["certified", "not certified", "not solved", "refused", "failed", "waiting"]
+State = Literal["certified", "not the part", "not certified", "not solved", "refused", "failed", "waiting"]
 FIGURES = {  # columns of batch.csv: their titles on the page
     "bijective": "det J > 0",
     "one_to_one": "one-to-one",
@@ -45,7 +45,8 @@ COLUMNS = ("surface", "folder", "state", *FIGURES, "line")
 PICTURE = "faces.png"  # of an output folder
 THUMBNAIL = (120, 90)  # pixels, at most
 COLORS = 64
-KINDS = {"certified": "good", "not certified": "bad", "not solved": "unsure", "refused": "bad", "failed": "bad"}
+KINDS = {"certified": "good", "not solved": "unsure"}  # the others that are done are bad
+KINDS |= dict.fromkeys(("not the part", "not certified", "refused", "failed"), "bad")
 WHOLE = ("seconds", "dofs", "iterations")
 
 

@@ -10,9 +10,14 @@ from ..report import document as reports
 from ..report.artifacts import PAGE
 from ..rounding import rounded
 from ..workflow.output_folder import Outcome
-from . import BAD_INPUT, DONE, NOT_CERTIFIED, NOT_SOLVED
+from . import BAD_INPUT, DONE, NOT_CERTIFIED, NOT_SOLVED, NOT_THE_PART
 
-CODES = {"certified": DONE, "not certified": NOT_CERTIFIED, "not solved": NOT_SOLVED}  # of a state
+CODES = {  # of a state
+    "certified": DONE,
+    "not the part": NOT_THE_PART,
+    "not certified": NOT_CERTIFIED,
+    "not solved": NOT_SOLVED,
+}
 SHOWN_ERRORS = (*EXACT_ERRORS, *ESTIMATES)
 
 
@@ -33,7 +38,9 @@ def verdict_in_words(outcome: Outcome) -> str:
     The text has the numbers and the advice, and last the verdict, the error and the page to open.
     """
     verdict = reports.verdict(outcome.report, outcome.folder)
-    lines = []
+    far, unsolved = reports.not_the_part(outcome.report), outcome.report.get("not_solved")
+    lines = [f"NOT THE PART     {far}"] if far else []
+    lines += [f"NOT SOLVED       {unsolved}"] if unsolved else []
     measured = verdict.get("arap", {})
     if "patches" in outcome.report["parameterization"]:  # each against its own box: the unit changes nothing
         measured = {"own boxes": measured["as_given"]} if measured else {}
@@ -52,6 +59,7 @@ def verdict_in_words(outcome: Outcome) -> str:
         lines += [f"{first:16s} {line}" for first, line in zip_longest([title][: len(found)], found, fillvalue="")]
     lines += [*levels[:-1], f"{rounded(verdict['seconds'], 1)} s", *advice.in_words(outcome.report)]
     proved = f"{reports.claim(outcome.report)} {verdict['bijective']}; one-to-one: {verdict['one_to_one']}"
+    proved = f"NOT THE PART; {proved}" if far else proved
     errors = any(level.get(key) is not None for level in verdict.get("levels", [])[-1:] for key in SHOWN_ERRORS)
     last = "error" if errors else "solved"  # of several blocks without an exact solution no error is known
     ending = {"verdict": proved, last: "".join(levels[-1:]), "open": str(outcome.folder / PAGE)}

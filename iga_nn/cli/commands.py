@@ -9,7 +9,7 @@ import os
 import sys
 from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import App, CycloptsError, Parameter
 
@@ -203,14 +203,11 @@ def study_elasticity(
 
 def _study(volume: Path, output: OutputOptions, study: StudyOptions) -> int:
     """Make a convergence study, print its table and return the exit code."""
-    from ..report import document as reports
     from ..workflow import pipeline
-    from .answer import exit_code
 
     with shown_progress(output.quiet):
         outcome, table = pipeline.study_to(volume, study_options=study, **output.folder)
-    _print(reports.as_json(outcome.report["study"]) if output.as_json else f"{table}\nresults in {outcome.folder}")
-    return exit_code(outcome.report)
+    return _tell(outcome, output, outcome.report.get("study"), table)
 
 
 @app.command(name="modes")
@@ -222,14 +219,22 @@ def find_modes(
     Frequencies are in Hz where the units agree: m, Pa and kg/m^3, or mm, MPa and t/mm^3. Results go to STEM-modes in
     the current folder, unless --out names another.
     """
-    from ..report import document as reports
     from ..workflow import pipeline
-    from .answer import exit_code
 
     with shown_progress(output.quiet):
         outcome, table = pipeline.modes_to(volume, modes_options=modes, **output.folder)
-    verdict = reports.verdict(outcome.report, outcome.folder)
-    _print(reports.as_json(verdict) if output.as_json else f"{table}\nresults in {outcome.folder}")
+    return _tell(outcome, output, None, table)
+
+
+def _tell(outcome: Outcome, output: OutputOptions, found: dict[str, Any] | None, table: str) -> int:
+    """Print a table, or with --json what was found; the verdict where nothing was solved. Return the exit code."""
+    from ..report import document as reports
+    from .answer import exit_code, verdict_in_words
+
+    if output.as_json:
+        _print(reports.as_json(found or reports.verdict(outcome.report, outcome.folder)))
+    else:
+        _print(f"{table}\nresults in {outcome.folder}" if table else verdict_in_words(outcome))
     return exit_code(outcome.report)
 
 

@@ -24,11 +24,13 @@ class StudyOptions(Checked):
             default. A formula that starts with a minus is written --exact=-x.
         degree: one or more degrees; the degree of the map by default.
         refine: levels to solve on, 0 1 2 or 0..2; level n halves every knot span of the map n times.
+        solve_anyway: solve also on a map that folds, or that is too far from its surface to stand for the part.
     """
 
     exact: Formula | None = None
     degree: tuple[int, ...] = ()
     refine: tuple[str, ...] = ("0..2",)
+    solve_anyway: bool = False
 
     command: ClassVar[str] = "study"
 
@@ -89,6 +91,7 @@ class ModesOptions(Checked):
         roller: regions held along their normal only.
         refine: number of times that every knot span of the map is halved.
         degree: degree of the trial space; the degree of the map by default.
+        solve_anyway: solve also on a map that folds, or that is too far from its surface to stand for the part.
     """
 
     young: float | str = 1.0
@@ -99,6 +102,7 @@ class ModesOptions(Checked):
     roller: tuple[str, ...] = ()
     refine: int = 0
     degree: int | None = None
+    solve_anyway: bool = False
 
     def problem(self) -> Elasticity:
         """Return the body, without loads. Raises InputError."""

@@ -45,6 +45,7 @@ class ProblemOptions(Checked, ABC):
         degree: degree of the trial space; the degree of the map by default.
         quadrature: quadrature rule of the operator: "gauss+1", degree + 1 Gauss points a span; "gauss", degree points a
             span; "spline", the fewest points with the same error as "gauss+1".
+        solve_anyway: solve also on a map that folds, or that is too far from its surface to stand for the part.
         unit: unit of lengths, such as mm; free text that is shown behind lengths and places and changes no number.
     """
 
@@ -53,6 +54,7 @@ class ProblemOptions(Checked, ABC):
     refine: tuple[int, ...] = (0, 1)
     degree: int | None = None
     quadrature: Literal["spline", "gauss", "gauss+1"] = "spline"
+    solve_anyway: bool = False
     unit: str | None = None
 
     section: ClassVar[str]  # its name on the command line and in report.json

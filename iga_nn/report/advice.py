@@ -11,7 +11,7 @@ from parameterize.spline.bspline import midpoints
 from parameterize.spline.volume import BSplineVolume
 
 from ..options import MapOptions
-from .document import Report, is_certified
+from .document import Report, is_certified, not_the_part
 
 SHOWN = 5  # places
 
@@ -45,12 +45,14 @@ def unproved(volume: BSplineVolume, certificate: Certificate) -> dict[str, Any]:
 
 
 def what_to_try(report: Report, mapping: MapOptions | None = None) -> list[str]:
-    """Return remedies for a map that is not certified, the most promising first; an empty list for a certified map.
+    """Return remedies for a map that is not certified or not the part, the most promising first; else an empty list.
 
     mapping: the options of the map, where they are known.
     """
     quality, remedies = report["parameterization"], list[str]()
-    if is_certified(report) or ("patches" in quality and mapping is None):  # several patches of a file
+    if is_certified(report) and not not_the_part(report):
+        return []
+    if "patches" in quality and mapping is None:  # several patches of a file
         return []
     if "patches" in quality and mapping is not None:
         kind = "max-" if mapping.control_points == "auto" else ""
@@ -73,7 +75,7 @@ def _of_the_surface(report: Report) -> list[str]:
     remedies = []
     if crossing := report.get("input", {}).get("self_intersections", {}).get("pairs", 0):
         remedies.append(f"a surface that does not intersect itself: {crossing} pairs of its faces do (`iga-nn check`)")
-    if report["parameterization"]["bijective"] == "certified":  # then the boundary meets itself, without a fold
+    if report["parameterization"].get("boundary_meeting") and report["parameterization"]["bijective"] == "certified":
         remedies.append("a surface whose parts are farther apart there, or more faces around that gap")
     return remedies
 

@@ -20,7 +20,7 @@ from .artifacts import REPORT, SOLVED
 
 SCHEMA = 1
 SAME_VOLUME = 1e-9  # per cent: rounding
-DEFECTS = ("unproved", "boundary_meeting", "misglued", "overlap")  # of the section `parameterization`
+DEFECTS = ("not_the_part", "unproved", "boundary_meeting", "misglued", "overlap")  # of the section `parameterization`
 
 Report = dict[str, Any]
 
@@ -110,11 +110,29 @@ def is_meaningful(report: Report) -> bool:
     return not levels or levels[-1].get("meaningful", True) is not False
 
 
-def state(report: Report) -> Literal["certified", "not certified", "not solved"]:
-    """Return the state of a finished run; "not solved" where the numbers of a solve are not to be trusted."""
+def state(report: Report) -> Literal["certified", "not the part", "not certified", "not solved"]:
+    """Return the state of a finished run.
+
+    "not the part" comes first; "not solved" where the numbers of a solve are not to be trusted.
+    """
+    if not_the_part(report):
+        return "not the part"
     if not is_certified(report):
         return "not certified"
     return "certified" if is_converged(report) and is_meaningful(report) else "not solved"
+
+
+def not_the_part(report: Report) -> str:
+    """Return why a map is too far from its surface to stand for the part, "" where it is not."""
+    return ", and ".join(report["parameterization"].get("not_the_part", ()))
+
+
+def why_not_solved(report: Report) -> str:
+    """Return why nothing is solved on a map unless the user asks for it, "" where nothing speaks against it."""
+    reasons = [f"the map is not the part: {far}"] if (far := not_the_part(report)) else []
+    if report["parameterization"]["bijective"] == "folded":
+        reasons.append("the map folds")
+    return "; ".join(reasons)
 
 
 def solved(report: Report) -> Report:

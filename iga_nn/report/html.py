@@ -125,6 +125,8 @@ def verdicts(report: Report) -> list[tuple[str, str, str]]:
         meaning += f" The worst place is u, v, w = {_point(quality['witness'])}."
     color = "good" if reports.is_certified(report) else "bad" if answer == "no" else "unsure"
     found = [(color, f"{claim}: {quality['bijective']}; one-to-one: {answer}", meaning)]
+    if far := reports.not_the_part(report):
+        found.insert(0, ("bad", "This is not the part", f"{far[0].upper()}{far[1:]}. What follows holds for the map."))
     if "not_solved" in report:
         what = "A level was not solved" if reports.solved(report) else "The problem was not solved"
         found.append(("bad", what, report["not_solved"]))

@@ -59,7 +59,7 @@ from .solving import (
     solve_levels,
     verdict_of,
 )
-from .verdict import write_certificate
+from .verdict import stays_unsolved, write_certificate
 
 log = logging.getLogger(__name__)
 
@@ -162,7 +162,7 @@ def parameterize_to(
         body = kept_map(state, given, known, problem) if mapping.resume else None
         if body is None:
             body = map_surface(state, given, mapping, progress, known, problem, unknowns).volume
-        if statement is None or problem is None:
+        if statement is None or problem is None or stays_unsolved(state, statement.solve_anyway):
             return _finish(state, body)
         problem = with_part(problem, state.folder / "volume.npz")
         kept = KeptLevels(state.folder, Checkpoints(state.folder / CHECKPOINT, given.identity, resume=True), statement)
@@ -179,7 +179,12 @@ def _command(mesh: str | Path, out: str | Path | None, mapping: MapOptions, stat
 
 def _identity(given: MapInput, statement: ProblemOptions | None) -> dict[str, Any]:
     """Return the identity of a run, as plain JSON values: that of its map, and the options of its problem."""
-    return reports.plain(given.identity | ({} if statement is None else {statement.section: asdict(statement)}))
+    return reports.plain(given.identity | ({} if statement is None else {statement.section: _choices(statement)}))
+
+
+def _choices(statement: ProblemOptions) -> dict[str, Any]:
+    """Return the options that shape a solution."""
+    return {name: value for name, value in asdict(statement).items() if name != "solve_anyway"}
 
 
 def checked(mapping: MapOptions, statement: ProblemOptions) -> tuple[BoundaryValueProblem, int]:
@@ -242,6 +247,10 @@ def solve_to(
                 state = stack.enter_context(open_folder(path, out, force, vector=vector))
                 state.begin("solution")
                 write_certificate(state, path, loaded, command)
+        unsolved = state is not None and stays_unsolved(state, statement.solve_anyway)
+        unsolved = unsolved if comm is None else comm.bcast(unsolved)
+        if unsolved:
+            return None if state is None else _finish(state, loaded)
         if state is None:
             deque(each_level(loaded, problem, statement.refine, options), maxlen=0)
             return None
@@ -289,6 +298,8 @@ def study_to(
     with open_folder(path, f"{default_folder(path)}-study" if out is None else out, force, vector=vector) as state:
         state.begin("study")
         write_certificate(state, path, loaded, command_line(study_options.command, path, study_options, out=out))
+        if stays_unsolved(state, study_options.solve_anyway):
+            return _finish(state, loaded), ""
         known = described(problem, loaded) | ({"exact": study_options.exact} if study_options.exact else {})
         study: dict[int, list[ConvergenceRow]] = {}
 
@@ -338,6 +349,8 @@ def modes_to(
     with open_folder(path, f"{default_folder(path)}-modes" if out is None else out, force, vector=vector) as state:
         state.begin("modes")
         write_certificate(state, path, loaded, command_line("modes", path, modes_options, out=out))
+        if stays_unsolved(state, modes_options.solve_anyway):
+            return _finish(state, loaded), ""
         with reported(state, loaded), state.timed("solve"), input_errors():
             found = modes(
                 loaded,
@@ -361,9 +374,11 @@ def _finished_by(
     Raises InputError where another run made the result, or where some of its files are missing.
     """
     folder, made_by, known = finished.folder, finished.report.get("command", ""), finished.report.get("identity")
-    if statement is not None and statement.section not in finished.report:
-        path = folder / "volume.npz"
-        raise InputError(f"{folder}: holds a finished volume; `iga-nn solve {statement.section} {path}` solves on it")
+    unfit = reports.why_not_solved(finished.report)
+    if statement is not None and statement.section not in finished.report and (statement.solve_anyway or not unfit):
+        path, anyway = folder / "volume.npz", " --solve-anyway" if unfit else ""
+        command = f"iga-nn solve {statement.section} {path}{anyway}"
+        raise InputError(f"{folder}: holds a finished volume; `{command}` solves on it")
     if known is None or (names := differing(identity, known)):
         why = ", whose report has no identity" if known is None else f" (different: {', '.join(names)})"
         remedy = "--force replaces it, --out names another folder"

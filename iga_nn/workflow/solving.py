@@ -26,6 +26,8 @@ from .output_folder import RunFolder
 
 log = logging.getLogger(__name__)
 
+NOT_SHOWN = ("refine", "degree", "solve_anyway")  # options of a problem that its section of the report leaves out
+
 
 def solve_levels(
     state: RunFolder,
@@ -67,7 +69,7 @@ def solve_levels(
 
 def section_of(statement: ProblemOptions, problem: BoundaryValueProblem, body: Body, done: Levels) -> dict[str, Any]:
     """Return the section of report.json on a problem and the levels that are done."""
-    asked = {name: given for name, given in asdict(statement).items() if name not in ("refine", "degree")}
+    asked = {name: given for name, given in asdict(statement).items() if name not in NOT_SHOWN}
     known = asked | described(problem, body)
     notices = [*notices_of(done.reports), *_growth(statement, problem, done)]
     return (

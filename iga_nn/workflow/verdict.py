@@ -37,6 +37,7 @@ def write_certificate(state: RunFolder, path: Path, body: BSplineVolume | MultiP
     """Certify a saved body, and write the sections of report.json about the input and the proof."""
     with state.timed("certify"):
         facts = certified_facts(body)
+        facts |= _measured_beside(path, facts)
     state.write(
         command=command,
         input={"file": str(path), "sha256": hashlib.sha256(path.read_bytes()).hexdigest()},
@@ -46,12 +47,36 @@ def write_certificate(state: RunFolder, path: Path, body: BSplineVolume | MultiP
     tell(state)
 
 
+def _measured_beside(path: Path, facts: dict[str, Any]) -> dict[str, Any]:
+    """Return how far a saved volume is from its surface, from the report of the run in its folder; empty without one."""
+    report = reports.read(path.parent) if path.name == "volume.npz" else None
+    known = (report or {}).get("parameterization", {})
+    if any(known.get(name) != reports.plain(facts[name]) for name in ("control_points", "det_lower_bound")):
+        return {}  # not the volume of that report
+    return {name: known[name] for name in ("surface_distance", "volume", "not_the_part") if name in known}
+
+
+def stays_unsolved(state: RunFolder, anyway: bool) -> bool:
+    """Return whether nothing is solved on the map of a report; then the log and the report say why.
+
+    anyway: whether the user asks for the solve on any map.
+    """
+    reason = reports.why_not_solved(state.report)
+    if anyway or not reason:
+        return False
+    state.write(not_solved=f"{reason}; --solve-anyway solves on it all the same")
+    log.warning("nothing is solved: %s", state.report["not_solved"])
+    return True
+
+
 def tell(state: RunFolder, mapping: MapOptions | None = None) -> None:
     """Log the verdict of the report; where the map is not certified, add the remedies to the report.
 
     mapping: the options of the map, where they are known.
     """
     quality = state.report["parameterization"]
+    if far := reports.not_the_part(state.report):
+        log.warning("the map is NOT THE PART: %s", far)
     log.info("certificate: %s", quality["bijective"])
     if meeting := quality["boundary_meeting"]:  # not one-to-one, although perhaps nowhere folded
         place = in_brackets(meeting["point"])
