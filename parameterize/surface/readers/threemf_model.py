@@ -105,9 +105,8 @@ class _Target(Xml):
         }
 
     def start_ns(self, prefix: str, namespace: str) -> None:
-        """Take the declaration of a prefix, which stands before the element that has it."""
-        if not self._depth:
-            self._prefixes[prefix] = namespace
+        """Take the declaration of a prefix, which comes before its element: those of the root before all others."""
+        self._prefixes[prefix] = namespace
 
     def start(self, tag: str, given: dict[str, str]) -> None:
         """Take an element of a namespace that is read; any other is skipped with all that is in it."""
