@@ -40,6 +40,7 @@ import pyvista
 import threemf_files
 from bodies import exact_ring
 from foreign_files import geopdes, geopdes_07, mfem_patches
+from gltf_files import moved
 from mesh_files import (
     CUBE,
     MIXED,
@@ -416,6 +417,7 @@ def scene_readers():
     """The pieces are what an archive or a .glb holds, so that spoiled ones get past its checksums."""
     nodes = [{"children": [1], "rotation": [0.5, 0.5, 0.5, 0.5]}, {"mesh": 0, "name": "a", "scale": [2, 1, 1]}]
     yield Reader("glb", ".glb", check, (list(gltf()), list(gltf(nodes=nodes))), glb, packed=True)
+    yield Reader("glb, moved", ".glb", check, tuple(list(boxes.pieces()) for boxes in moved()), glb)
     yield surface_reader("gltf", ".gltf", gltf(inside=False)[0])
     beside = list(gltf(beside="a.bin"))
     yield Reader(

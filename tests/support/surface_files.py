@@ -5,6 +5,7 @@ import struct
 
 import numpy as np
 import threemf_files
+from gltf_files import BOX, Gltf
 from mesh_files import (
     CUBE,
     MIXED,
@@ -45,6 +46,12 @@ ACCEPTED = {
     "scene.glb": (glb(gltf()), None),
     "inside.gltf": (gltf(inside=False)[0], None),
     "mirrored.glb": (glb(gltf(nodes=[{"mesh": 0, "scale": [1, 1, -1], "translation": [0, 0, 1]}])), None),
+    "used.glb": (glb(gltf(extensionsUsed=["EXT_made_up"])), "left out the extension 'EXT_made_up'"),
+    "beside_draco.glb": (
+        glb(gltf(extensionsUsed=["KHR_draco_mesh_compression"])),
+        "read the plain arrays beside those that KHR_draco_mesh_compression compresses",
+    ),
+    "animated.glb": (glb(gltf(animations=[{}])), "left out 1 animations: the scene is read at rest"),
     "model.3mf": (threemf(model(build='<item objectid="1"/>', unit="meter")), None),
     "parts.3mf": (threemf_files.archive(threemf_files.PIECES), "left out 1 objects of type support"),
     "unnamed.3mf": (threemf_files.archive({"3D/a.model": threemf_files.model()}), "read its only model, '3D/a.model'"),
@@ -107,7 +114,13 @@ REFUSED = {
     ),
     "garbage.glb": ("hello\n", "its first word is not glTF"),
     "cut.glb": (glb(gltf())[:-20], "promises"),
-    "draco.glb": (glb(gltf(primitive={"extensions": {"KHR_draco_mesh_compression": {}}})), "save it without compr"),
+    "draco.glb": (glb(gltf(extensionsRequired=["KHR_draco_mesh_compression"])), "save it without compression"),
+    "required.glb": (glb(gltf(extensionsRequired=["EXT_made_up"])), "requires the extension 'EXT_made_up'"),
+    "quaternion.glb": (
+        glb(gltf(nodes=[{"mesh": 0, "rotation": [1, 1, 1, 1]}])),
+        "a quaternion of length 2, expected 1",
+    ),
+    "weights.glb": (glb(Gltf().morph(BOX, mesh=[1, 1]).pieces()), "2 weights for 1 morph targets"),
     "beside.gltf": (gltf(buffers=[{"byteLength": 9, "uri": "cube.bin"}])[0], "in 'cube.bin', which is not beside it"),
     "circle.glb": (glb(gltf(nodes=[{"children": [0]}])), "are no tree"),
     "range.glb": (glb(gltf(faces=TRIANGLES + 1)), "vertex numbers out of range"),

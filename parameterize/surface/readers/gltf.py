@@ -1,31 +1,29 @@
 """glTF 2.0, .glb and .gltf, with its buffers inside or in files beside it: the triangles of the scene in their places.
 
-Nodes and materials give groups by their names. The unit of the format is the metre. (Khronos, "glTF 2.0
-Specification", 2021.)
+Nodes and materials give groups by their names. The unit of the format is the metre. Animations are left out: what
+nodes, weights and joints say is the scene at rest. (Khronos, "glTF 2.0 Specification", 2021.)
 """
 
-import binascii
 import json
-from base64 import b64decode
 from collections import Counter
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ...arrays import Array, IntArray
+from ...arrays import Array, IntArray, Mask
 from ..errors import MeshError, check_face_count, check_indices
 from ..groups import gathered
 from .beside import Beside
 from .common import DAMAGED, Content
+from .gltf_arrays import Arrays, item
+from .gltf_extensions import INSTANCES, compression_of, extension, unread
+from .gltf_nodes import Nodes, instance_count, instance_places
+from .gltf_shapes import joint_matrices, morphed, skinned, weights_of
 
-NUMBERS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}  # by componentType
-WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
 WITHOUT_AREA = {0: "points", 1: "lines", 2: "line loops", 3: "line strips"}
 TRIANGLES, STRIP, FAN = 4, 5, 6
-COMPRESSED = ("KHR_draco_mesh_compression", "EXT_meshopt_compression")
-DEEPEST = 100  # nodes above a node
+ARRAYS = ("POSITION", "JOINTS_", "WEIGHTS_")  # of a primitive, those that are read
 UNIT = "m"
 
 
@@ -65,9 +63,9 @@ def scene_of(text: bytes, binary: bytes, max_faces: int, beside: Beside) -> Cont
         document = json.loads(text.decode("utf-8-sig"))
         if not isinstance(document, dict) or "asset" not in document:
             raise MeshError("is no glTF: its description has no asset; export it again")
-        scene = _Scene(document, binary, max_faces, beside)
         with np.errstate(all="ignore"):  # what is not finite is refused later
-            return scene.content()
+            notices = unread(document)
+            return _Scene(document, Arrays(document, binary, beside), Nodes(document), max_faces).content(notices)
     except (ValueError, KeyError, IndexError, TypeError, AttributeError, RecursionError, OverflowError) as error:
         if isinstance(error, MeshError):
             raise
@@ -77,142 +75,123 @@ def scene_of(text: bytes, binary: bytes, max_faces: int, beside: Beside) -> Cont
 
 @dataclass
 class _Scene:
-    """A glTF document while its nodes are visited."""
+    """A glTF document while its nodes are visited. taken, placed: how many faces and points it has so far."""
 
     document: dict[str, Any]
-    binary: bytes
+    arrays: Arrays
+    nodes: Nodes
     max_faces: int
-    beside: Beside
     points: list[Array] = field(default_factory=list)
     faces: list[IntArray] = field(default_factory=list)
     named: list[tuple[str, IntArray]] = field(default_factory=list)
     left_out: Counter[str] = field(default_factory=Counter)
-    visited: set[int] = field(default_factory=set)
-    buffers: dict[int, bytes] = field(default_factory=dict)
+    skins: dict[int, Array] = field(default_factory=dict)
+    taken: int = 0
+    placed: int = 0
 
-    def content(self) -> Content:
-        """Return the triangles of all nodes of the scene."""
-        nodes = self.document.get("nodes", [])
-        scenes = self.document.get("scenes", [])
-        inner = {child for node in nodes for child in node.get("children", [])}
-        roots = [number for number in range(len(nodes)) if number not in inner]
-        if scenes:
-            roots = scenes[self.document.get("scene", 0)].get("nodes", [])
-        for number in roots:
-            self._visit(number, np.eye(4), (), 0)
+    def content(self, notices: tuple[str, ...]) -> Content:
+        """Return the triangles of all nodes of the scene, with further notices."""
+        meshes = {number for number, node in enumerate(self.nodes.rows) if "mesh" in node}
+        for number, names, hidden in self.nodes.walk():
+            if number in meshes and hidden:
+                self.left_out[f"nodes with meshes that {hidden}"] += 1
+            else:
+                self._visit(number, names)
+            meshes.discard(number)
+        self.left_out["nodes with meshes that are outside the scene"] += len(meshes)
+        self.left_out["animations: the scene is read at rest"] += len(self.document.get("animations", []))
+        left_out = [f"left out {count} {kind}" for kind, count in self.left_out.items() if count]
         if not self.faces:
-            raise MeshError("has no triangles: export the surface")
-        notices = [f"left out {count} {kind}" for kind, count in self.left_out.items()]
+            raise MeshError(f"has no triangles{'; ' * bool(left_out)}{', '.join(left_out)}: export the surface")
         polygons = np.concatenate(self.faces).tolist()
-        return Content(np.concatenate(self.points), polygons, tuple(notices), gathered(self.named), UNIT)
+        return Content(np.concatenate(self.points), polygons, (*left_out, *notices), gathered(self.named), UNIT)
 
-    def _visit(self, number: int, above: Array, names: tuple[str, ...], depth: int) -> None:
-        """Take the mesh of a node and those below it."""
-        if number in self.visited or depth > DEEPEST:
-            raise MeshError(f"the nodes of the glTF are no tree; {DAMAGED}")
-        self.visited.add(number)
-        node = self.document["nodes"][_index(number)]
-        place = above @ _matrix(node)
-        names = (*names, str(node.get("name", "")))
-        if "mesh" in node:
-            if "skin" in node:
-                self.left_out["skins: the mesh is in its rest position"] += 1
-            for primitive in self.document["meshes"][_index(node["mesh"])]["primitives"]:
-                self._take(primitive, place, names)
-        for child in node.get("children", []):
-            self._visit(child, place, names, depth + 1)
-
-    def _take(self, primitive: dict[str, Any], place: Array, names: tuple[str, ...]) -> None:
-        """Take the triangles of a primitive."""
-        extensions = primitive.get("extensions", {})
-        if packed := [name for name in COMPRESSED if name in extensions]:
-            raise MeshError(f"compressed by {packed[0]}, which is not read: save it without compression")
-        mode = primitive.get("mode", TRIANGLES)
-        if mode in WITHOUT_AREA:
-            self.left_out[WITHOUT_AREA[mode]] += 1
+    def _visit(self, number: int, names: tuple[str, ...]) -> None:
+        """Take the mesh of a node, where it has one."""
+        node = self.nodes.node(number)
+        if "mesh" not in node:
+            self.left_out["sets of instances without a mesh"] += bool(extension(node, INSTANCES))
             return
-        points = self._numbers(primitive["attributes"]["POSITION"], "VEC3").astype(np.float64)
-        row = np.arange(len(points))
+        if "skin" in node and extension(node, INSTANCES):
+            raise MeshError(f"instances ({INSTANCES}) of a skinned mesh have no meaning: export it without one of them")
+        for primitive in item(self.document.get("meshes", []), node["mesh"], "mesh")["primitives"]:
+            mode = primitive.get("mode", TRIANGLES)
+            if mode in WITHOUT_AREA:
+                self.left_out[WITHOUT_AREA[mode]] += 1
+            elif "POSITION" not in primitive["attributes"]:
+                self.left_out["primitives without positions"] += 1
+            else:
+                self._take(primitive, number, names)
+
+    def _take(self, primitive: dict[str, Any], number: int, names: tuple[str, ...]) -> None:
+        """Take the triangles of a primitive of the mesh at a node."""
+        node = self.nodes.node(number)
+        self._check_plain(primitive)
+        count = instance_count(self.arrays, node)
+        used, faces = self._faces(primitive, count)
+        weights = weights_of(node, item(self.document["meshes"], node["mesh"], "mesh"))
+        points = morphed(self.arrays, primitive, weights, used)
+        if "skin" in node:  # the node's own place has no meaning then
+            moved, mirrored = skinned(self.arrays, primitive, self._joints(node["skin"]), points, used)
+        else:
+            places = self.nodes.world(number) @ instance_places(self.arrays, node, count)
+            moved = points @ places[:, :3, :3].transpose(0, 2, 1) + places[:, None, :3, 3]
+            mirrored = np.repeat(np.linalg.det(places[:, :3, :3]) < 0, len(points))
+        self._add(moved.reshape(-1, 3), _turned(_repeated(faces, len(points), count), mirrored), primitive, names)
+
+    def _check_plain(self, primitive: dict[str, Any]) -> None:
+        """Raise MeshError where a primitive has compressed arrays alone."""
+        attributes = primitive["attributes"]
+        read = [attributes[name] for name in attributes if name.startswith(ARRAYS)]
+        read += [primitive["indices"]] if "indices" in primitive else []
+        if (packed := compression_of(primitive)) and not all(map(self.arrays.is_stored, read)):
+            raise MeshError(f"compressed by {packed}, which is not read: save it without compression")
+
+    def _faces(self, primitive: dict[str, Any], instances: int) -> tuple[IntArray, IntArray]:
+        """Return the vertices of a primitive that triangles use, (n,) ascending, and these triangles (m, 3) of them.
+
+        The limit of faces is checked for all instances before arrays take memory.
+        """
+        mode = primitive.get("mode", TRIANGLES)
+        vertices = self.arrays.count(primitive["attributes"]["POSITION"])
+        corners = self.arrays.count(primitive["indices"]) if "indices" in primitive else vertices
+        check_face_count(self.taken + instances * (corners // 3 if mode == TRIANGLES else corners - 2), self.max_faces)
+        row: IntArray = np.arange(corners)
         if "indices" in primitive:
-            row = self._numbers(primitive["indices"], "SCALAR").astype(np.int64).ravel()
+            row = self.arrays.numbers(primitive["indices"], "SCALAR", row).ravel()
         faces = _triangles(row, mode)
-        check_indices(points, faces)
-        first = sum(map(len, self.faces))
-        check_face_count(first + len(faces), self.max_faces)
-        if np.linalg.det(place[:3, :3]) < 0:
-            faces = faces[:, ::-1]
-        self.faces.append(faces + sum(map(len, self.points)))
-        self.points.append(points @ place[:3, :3].T + place[:3, 3])
-        numbers = first + np.arange(len(faces))
-        material = self.document["materials"][_index(primitive["material"])] if "material" in primitive else {}
+        check_indices(np.broadcast_to(0.0, (vertices, 3)), faces)
+        used, numbers = np.unique(faces, return_inverse=True)
+        return used, numbers.reshape(-1, 3)
+
+    def _joints(self, number: Any) -> Array:
+        """Return the matrices (j, 4, 4) of the joints of a skin."""
+        skin = item(self.document.get("skins", []), number, "skin")
+        if number not in self.skins:
+            self.skins[number] = joint_matrices(self.arrays, self.nodes, skin)
+        return self.skins[number]
+
+    def _add(self, points: Array, faces: IntArray, primitive: dict[str, Any], names: tuple[str, ...]) -> None:
+        """Add triangles in their place to those of the scene, and to the groups of their nodes and their material."""
+        numbers = self.taken + np.arange(len(faces))
+        self.taken += len(faces)
+        self.faces.append(faces + self.placed)
+        self.placed += len(points)
+        self.points.append(points)
+        material = {}
+        if "material" in primitive:
+            material = item(self.document.get("materials", []), primitive["material"], "material")
         self.named += [(name, numbers) for name in (*names, str(material.get("name", "")))]
 
-    def _numbers(self, number: int, kind: str) -> NDArray[Any]:
-        """Return the numbers of an accessor, (n, width)."""
-        accessor = self.document["accessors"][_index(number)]
-        if accessor["type"] != kind:
-            raise MeshError(f"an accessor of the glTF holds {accessor['type']!r:.20}, expected {kind}; {DAMAGED}")
-        if "sparse" in accessor or "bufferView" not in accessor:
-            raise MeshError("sparse arrays of glTF are not read: save it without morph targets")
-        view = self.document["bufferViews"][_index(accessor["bufferView"])]
-        if any(name in view.get("extensions", {}) for name in COMPRESSED):
-            raise MeshError("compressed by EXT_meshopt_compression, which is not read: save it without compression")
-        dtype, width, count = np.dtype(NUMBERS[accessor["componentType"]]), WIDTHS[kind], _index(accessor["count"])
-        step = _index(view.get("byteStride", 0)) or dtype.itemsize * width
-        start = _index(view.get("byteOffset", 0)) + _index(accessor.get("byteOffset", 0))
-        data = self._buffer(_index(view["buffer"]))
-        if (
-            count < 1
-            or step < dtype.itemsize * width
-            or start + (count - 1) * step + dtype.itemsize * width > len(data)
-        ):
-            raise MeshError(f"an array of the glTF reaches beyond its {len(data)} bytes; {DAMAGED}")
-        found = np.ndarray((count, width), dtype, data, start, (step, dtype.itemsize))
-        if accessor.get("normalized") and dtype.kind in "iu":
-            return np.maximum(found / float(np.iinfo(dtype).max), -1.0)
-        return found
 
-    def _buffer(self, number: int) -> bytes:
-        if number not in self.buffers:
-            uri = self.document["buffers"][number].get("uri")
-            if uri is None:
-                self.buffers[number] = self.binary
-            else:
-                self.buffers[number] = _embedded(uri) if uri.startswith("data:") else self.beside(uri)
-        return self.buffers[number]
+def _repeated(faces: IntArray, points: int, count: int) -> IntArray:
+    """Return the triangles (count * m, 3) of `count` copies of triangles (m, 3) of so many points."""
+    return (faces + points * np.arange(count)[:, None, None]).reshape(-1, 3)
 
 
-def _embedded(uri: str) -> bytes:
-    """Return the bytes of a data URI."""
-    try:
-        return b64decode(uri.partition(",")[2], validate=True)
-    except binascii.Error as error:
-        raise MeshError(f"an array of the glTF is no base64 ({error}); {DAMAGED}") from None
-
-
-def _index(value: Any) -> int:
-    """Return a whole number that is not negative; a list would count a negative one from its end."""
-    if not isinstance(value, int) or value < 0:
-        raise MeshError(f"a number of the glTF must be whole and not negative, got {value!r:.40}; {DAMAGED}")
-    return value
-
-
-def _matrix(node: dict[str, Any]) -> Array:
-    """Return the matrix (4, 4) of a node, given whole or as translation, rotation and scale."""
-    if "matrix" in node:
-        return np.asarray(node["matrix"], dtype=np.float64).reshape(4, 4).T
-    x, y, z, w = (float(number) for number in node.get("rotation", (0.0, 0.0, 0.0, 1.0)))
-    rotation = np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-        ]
-    )
-    found = np.eye(4)
-    found[:3, :3] = rotation * np.asarray(node.get("scale", (1.0, 1.0, 1.0)), dtype=np.float64).reshape(3)
-    found[:3, 3] = np.asarray(node.get("translation", (0.0, 0.0, 0.0)), dtype=np.float64).reshape(3)
-    return found
+def _turned(faces: IntArray, mirrored: Mask) -> IntArray:
+    """Return triangles (m, 3), those turned round of which most corners are mirrored. mirrored: of each point (n,)."""
+    return np.where(mirrored[faces].sum(axis=1)[:, None] >= 2, faces[:, ::-1], faces)
 
 
 def _triangles(row: IntArray, mode: int) -> IntArray:
