@@ -49,6 +49,11 @@ class Checkpoints:
             for path in [path for name in KEPT for path in folder.glob(f"{name}*.safetensors")]:
                 path.unlink()
 
+    @classmethod
+    def none(cls) -> "Checkpoints":
+        """Return checkpoints that keep nothing."""
+        return cls(None, {}, resume=False)
+
     def of_part(self, name: str | int) -> "Checkpoints":
         """Return the checkpoints of another part of the run, in files of their own."""
         other = copy(self)

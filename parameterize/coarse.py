@@ -4,7 +4,6 @@ The first rounds move the map far, and need no fine spline for that; on fewer sp
 The map so found is then interpolated on the fine knots.
 """
 
-import math
 from dataclasses import replace
 from typing import Any
 
@@ -48,11 +47,8 @@ def optimize_coarse_first(
     fine = (open_uniform_knots(config.control_points, config.degree),) * 3
     if not start.nets.one_cube or len(fine[0]) == len(start.knots[0]):
         return *optimize(start, fit, config, schedule, weights, checkpoints=checkpoints, **report), fit
-    longer = (len(fine[0]) / len(start.knots[0])) ** 1.5  # about, of a step on all control points
     begun = min(schedule.grown or PATIENT_ROUNDS, schedule.rounds - 1)  # at least one round is on all
-    usual = schedule.usual_steps[:begun]
-    usual += tuple(math.ceil(longer * steps) for steps in schedule.usual_steps[begun:])
-    first = replace(schedule, rounds=begun, usual_steps=usual)
+    first = replace(schedule, rounds=begun)
     kept = checkpoints.of_part("coarse")
     found, earlier = optimize(start, fit, config, first, weights, checkpoints=kept, **report)
     start = found.spline.interpolated(fine)

@@ -15,11 +15,13 @@ from .arrays import Array
 
 @dataclass(frozen=True)
 class Progress:
-    """State after one step; `seconds_left` counts the present stage and all later training stages.
+    """State after one step.
 
+    seconds_left: of the present and all later training stages, from the seconds of the steps that are done and the
+    number of those that are planned; None for other stages, which end once they gain nothing more, and whose `steps`
+    are the most that there may be.
     mapped: while the network is trained, computes where it maps the surface as it is now, (n, 3) with the cube at
     0..1; the first rows are the surface's own vertices. Costs one evaluation, changes nothing.
-    seconds_after: the seconds from then to the end of a usual run, where they are known.
     """
 
     stage: str
@@ -27,9 +29,8 @@ class Progress:
     steps: int
     loss: float
     folded: int
-    seconds_left: float
+    seconds_left: float | None
     mapped: Callable[[], Array] | None = field(default=None, compare=False, repr=False)
-    seconds_after: float | None = None
 
 
 ProgressCallback = Callable[[Progress], None]

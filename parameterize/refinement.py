@@ -19,7 +19,6 @@ from .config import RefinementConfig, SplineConfig
 from .optimization.determinant_penalty import MIN_COEFFICIENT
 from .optimization.distortion import ARAP_LIMIT
 from .optimization.endings import Course
-from .optimization.newton import LEAST_STEPS
 from .optimization.optimized import Optimized
 from .optimization.phases import FIRM_ROUNDS, Polish, Schedule, Separate, Unfold
 from .optimization.rounds import optimize
@@ -259,7 +258,7 @@ def _optimized_on(
 ) -> tuple[Optimized, SurfaceFit, Course]:
     """Insert the knots and continue with the rounds that follow those of a certified map; return their course, too."""
     phases = (Unfold(), Separate(), Polish(rounds=POLISH))
-    schedule = Schedule(phases, FIRM_ROUNDS + ROUNDS, (LEAST_STEPS,) * (FIRM_ROUNDS + 2), gain=_GAIN)
+    schedule = Schedule(phases, FIRM_ROUNDS + ROUNDS, gain=_GAIN)
     first = spline.on_knots(finer)
     surface = fit.on_nets(first.nets)
     found, course = optimize(

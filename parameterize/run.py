@@ -180,7 +180,7 @@ def parameterize(
     with timed(seconds, "fit"):
         copy, _ = surface.fitted
         held = given if given is None or copy is surface else corner_vertices(copy, surface.vertices[given])
-    task = Task(copy, config, seed, place, dtype, held, seconds, report)
+    task = Task(copy, config, seed, place, dtype, held, seconds, report, checkpoints)
     tried = attempts(task, checkpoints)
     best = best_of(tried)
     assert best is not None  # the last start that is tried makes a map of any shape

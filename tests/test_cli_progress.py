@@ -43,16 +43,34 @@ def test_plain_lines_come_every_ten_seconds(monkeypatch):
     display = progress.Display(Console(file=out, width=200))
     for now[0] in (1.0, 9.0, 11.0, 12.0, 22.0):
         progress.tell_batch(display.show, batch("waiting", "waiting", "certified"), RUNNING)
-    assert out.getvalue() == 2 * "1 of 3 surfaces; bean cube 40%, duck spline 90%\n"
+    line = "1 of 3 surfaces; bean cube 40%, duck spline 90%"
+    assert out.getvalue() == f"{line}; 0:11 passed\n{line}; 0:22 passed\n"
 
 
-def test_a_run_has_a_line_for_every_stage():
+def test_a_run_has_a_line_for_every_stage(monkeypatch):
     out = io.StringIO()
+    monkeypatch.setattr(progress.time, "monotonic", lambda: 5.0)
     display = progress.Display(Console(file=out, width=200))
     for stage, step in (("cube", 0), ("cube", 1), ("edges", 0)):
         progress.tell_run(display.show, Progress(stage, step, 5, 0.5, 1, 61.0))
-    rest = "/5, 1 fold, 1:01 left, then the spline fit, loss 5.000e-01"
+    rest = "/5, 1 fold, 1:01 of the training left, loss 5.000e-01; 0:00 passed"
     assert out.getvalue().splitlines() == [f"cube     step 0{rest}", f"edges    step 0{rest}"]
+
+
+def test_where_the_number_of_steps_is_not_known_no_end_is_shown(monkeypatch):
+    """The steps of the layout and of the rounds end once they gain nothing more: only what has passed is known."""
+    now = [100.0]
+    monkeypatch.setattr(progress.time, "monotonic", lambda: now[0])
+    out, terminal = io.StringIO(), io.StringIO()
+    display = progress.Display(Console(file=out, width=200))
+    for now[0] in (103.0, 500.0, 700.0):
+        progress.tell_run(display.show, Progress("spline", 12, 640, 0.5, 0, None))
+    line = "spline   step 12, 0 folds, loss 5.000e-01;"
+    assert out.getvalue().splitlines() == [f"{line} 0:03 passed", f"{line} 6:40 passed", f"{line} 10:00 passed"]
+    shown = progress.Display(Console(file=terminal, force_terminal=True))
+    progress.tell_run(shown.show, Progress("layout", 3, 300, 0.5, 0, None))
+    (task,) = shown.bar.tasks
+    assert task.total is None and task.completed == 3 and "left" not in task.fields["state"]
 
 
 @pytest.mark.parametrize("quiet", [True, False])

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from shapes import ball
 
+from parameterize.checkpoint import Checkpoints
 from parameterize.cube.sphere import _STEPS, _relaxed, _tangents, _Triangles, lay_on_sphere
 
 
@@ -154,10 +155,33 @@ def test_each_step_is_told_and_may_be_the_last():
     assert [now.step for now in told] == list(range(1, len(told) + 1)) and len(told) > 2
     assert {(now.stage, now.steps) for now in told} == {("layout", _STEPS)}
     assert np.all(np.diff([now.loss for now in told]) < 0.0)
-    assert all(now.seconds_left > 0.0 for now in told)
+    assert all(now.seconds_left is None for now in told)  # nobody knows how many steps a surface takes
 
     def stop(_):
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
         lay_on_sphere(vertices, faces, stop)
+
+
+def test_steps_that_are_interrupted_are_not_taken_again(tmp_path, monkeypatch):
+    vertices, faces = horseshoe(400)
+    told = []
+    whole = lay_on_sphere(vertices, faces, told.append)
+
+    def stop(now):
+        if now.step == 3:
+            raise KeyboardInterrupt
+
+    def kept(resume):
+        return Checkpoints(tmp_path, {}, resume=resume)
+
+    with pytest.raises(KeyboardInterrupt):
+        lay_on_sphere(vertices, faces, stop, kept(False))
+    monkeypatch.setattr("parameterize.cube.sphere._halves", lambda *_: pytest.fail("cut again"))
+    after = []
+    for rest in (list(range(4, len(told) + 1)), []):  # the second one finds the layout finished
+        found = lay_on_sphere(vertices, faces, after.append, kept(True))
+        assert [now.step for now in after] == rest
+        assert np.array_equal(found.places, whole.places) and np.array_equal(found.points, whole.points)
+        after.clear()

@@ -15,7 +15,7 @@ from parameterize.optimization.optimized import Optimized
 from parameterize.optimization.term import Weights
 from parameterize.progress import History, Progress, ignore
 from parameterize.spline.bspline import open_uniform_knots
-from parameterize.starts.growth import GROWTH, LAST, SHARES, STEPS, STIFF, first_cube
+from parameterize.starts.growth import GROWTH, LAST, SHARES, STIFF, first_cube
 from parameterize.starts.on_cube import surface_on_cube
 from parameterize.starts.start import Task
 from parameterize.surface.surface import surface_from_arrays
@@ -67,7 +67,6 @@ def test_the_rounds_in_which_it_grows_come_first():
     schedule = GROWTH.schedule(preset("fast"))
     assert [phase.name for phase in schedule.phases] == ["grow", "unfold", "separate", "polish"]
     assert schedule.rounds == schedule.grown + 20
-    assert schedule.usual_steps[: schedule.grown] == (STEPS,) * schedule.grown
     assert list(SHARES) == sorted(SHARES) and SHARES[-1] == 1.0
     shorter = GROWTH.schedule(preset("fast").scaled(0.5))
     assert (schedule.phases[0].steps, shorter.phases[0].steps) == (12, 6)

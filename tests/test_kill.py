@@ -1,6 +1,7 @@
-"""Runs killed by SIGKILL and resumed: one in every test run, thirty in the slow one."""
+"""Runs killed by SIGKILL and resumed: a few in every test run, at thirty moments and all stages in the slow one."""
 
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -9,23 +10,33 @@ import pytest
 
 import iga_nn
 
-PLACES = os.pathsep.join(str(Path(iga_nn.__file__).parents[1] / place) for place in (".", "tests/support"))
+PLACES = os.pathsep.join(str(Path(iga_nn.__file__).parents[1] / place) for place in (".", "tests/support", "tests"))
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
 
 
-def killing(moments):
-    command = [sys.executable, str(Path(__file__).parent / "support" / "killing.py"), "--moments", str(moments)]
+def killed(program, *options):
+    command = [sys.executable, str(Path(__file__).parent / "support" / program), *options]
     environment = os.environ | {"PYTHONPATH": PLACES, "OMP_NUM_THREADS": "1"}
     done = subprocess.run(command, env=environment, capture_output=True, text=True)
     print(done.stdout)  # noqa: T201 - the log is what the long test is run for
     assert done.returncode == 0, done.stdout + done.stderr
-    assert f"{moments} of {moments} volumes are the same" in done.stdout
+    (last,) = re.findall(r"(\d+) of (\d+) volumes are the same", done.stdout)
+    assert last[0] == last[1] != "0"
 
 
 def test_killed_at_a_moment_and_resumed():
-    killing(1)
+    killed("killing.py", "--moments", "1")
 
 
 @pytest.mark.slow
 def test_killed_at_thirty_moments_and_resumed():
-    killing(30)
+    killed("killing.py", "--moments", "30")
+
+
+def test_killed_once_blocks_are_laid_and_resumed():
+    killed("killing_stages.py", "--bodies", "L", "shaft")
+
+
+@pytest.mark.slow
+def test_killed_after_each_stage_and_resumed():
+    killed("killing_stages.py")

@@ -204,8 +204,8 @@ async def seen_by_another_tab(tab, folder):
 
 
 async def trained(tab, folder):
-    """Loss and time left, and the six faces' colours on the surface."""
-    await tab.sees("Time left", PATIENCE)
+    """Loss and time, and the six faces' colours on the surface."""
+    await tab.sees("Time passed", PATIENCE)
     assert re.search(r"Loss\n\d\.\d\de[+-]\d\d\n", await tab.text())
     await tab.sees("each colour is one face of the cube", PATIENCE)
     await shows_faces(tab, folder / "training.png")
@@ -277,7 +277,7 @@ async def shows_faces(tab, path, seconds=30.0):
 
 async def stopped(tab):
     await tab.click("Start")
-    await tab.sees("Time left", PATIENCE)
+    await tab.sees("Time passed", PATIENCE)
     await tab.click("Stop")
     await tab.sees("Resume continues where it was stopped", PATIENCE)
 

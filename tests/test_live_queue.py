@@ -202,7 +202,7 @@ def test_a_failed_job_is_tried_again_anew(tmp_path):
     ends = iter(["failed", "done"])
 
     def run(job):
-        seen.append((list(job.log), job.progress, job.course.share))
+        seen.append((list(job.log), job.progress))
         yield "started"
         yield Step(AT, None)
         yield Ended(next(ends), "why")
@@ -215,7 +215,7 @@ def test_a_failed_job_is_tried_again_anew(tmp_path):
     assert job.text == "why" and job.progress == AT
     jobs.start(job)
     wait_for(job, "done")
-    assert seen == [([], None, 0.0)] * 2
+    assert seen == [([], None)] * 2
     jobs.close()
 
 

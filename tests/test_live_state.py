@@ -7,7 +7,6 @@ import os
 import numpy as np
 
 from iga_nn.figures.evaluate import FACE_COLORS
-from iga_nn.live.course import Course
 from iga_nn.live.queue import Job
 from iga_nn.live.state import colors, places, row, triangles
 from iga_nn.options import PoissonOptions
@@ -42,15 +41,16 @@ def test_colours_are_those_of_the_cubes_faces():
         assert {"#" + bytes(rgb).hex() for rgb in found[on_it]} == {color}
 
 
-def test_a_row_says_stage_loss_and_time_left(tmp_path):
+def test_a_row_says_stage_loss_and_time_left_of_the_training(tmp_path, monkeypatch):
+    monkeypatch.setattr("iga_nn.live.state.time.time", lambda: 1065.0)
     job = Job(2, "bean.obj", tmp_path, state="running", surface=sample("bean"), losses=[10.0, 1.0, 0.1])
     job.progress = Progress("cube", 30, 300, 0.1, 4, 83.4)
-    job.course = Course(lambda: 5.0)
-    job.course.tell(83.0)
+    job.begun = 1000.0
     said = row(job, 0, PoissonOptions())
-    assert [fact[1] for fact in said["facts"]] == ["3 of 7: to a cube", "1:23", "1.00e-01", "4"]
+    assert [fact[1] for fact in said["facts"]] == ["3 of 7: to a cube", "1:05", "1.00e-01", "4"]
+    assert said["facts"][1] == ["Time passed", "1:05", "1:24 of the training left"]
     assert said["facts"][3][2] == "0 is the aim"
-    assert said["share"] == 0.0 and said["curve"] == "0.0,5.0 50.0,50.0 100.0,95.0"
+    assert said["share"] == 0.1 and said["curve"] == "0.0,5.0 50.0,50.0 100.0,95.0"
     assert said["size"] == "2,500 vertices, 4,996 faces" and said["files"] == []
     assert json.loads(json.dumps(said)) == said
 
@@ -71,14 +71,16 @@ def test_a_waiting_job_knows_its_place(tmp_path):
 
 
 def test_where_the_end_is_not_known_a_row_says_so(tmp_path):
-    job = Job(2, "bean.obj", tmp_path, state="running", progress=Progress("spline", 600, 640, 0.1, 0, 9.0))
-    _, left, _, folds = row(job, 0, PoissonOptions())["facts"]
-    assert left == ["Time left", "not known", "longer than usual"]
+    job = Job(2, "bean.obj", tmp_path, state="running", progress=Progress("spline", 600, 640, 0.1, 0, None))
+    said = row(job, 0, PoissonOptions())
+    stage, passed, _, folds = said["facts"]
+    assert stage[2] == "step 600" and said["share"] is None
+    assert (passed[0], passed[2]) == ("Time passed", "how much is left is not known")
     assert folds == ["Folds at samples", "0", "between them the proof decides"]
 
 
 def test_once_the_volume_of_this_run_is_made_the_last_stage_has_begun(tmp_path):
-    job = Job(2, "bean.obj", tmp_path, state="running", progress=Progress("spline", 600, 640, 0.1, 0, 9.0))
+    job = Job(2, "bean.obj", tmp_path, state="running", progress=Progress("spline", 600, 640, 0.1, 0, None))
     job.results.mkdir()
     job.volume.write_bytes(b"of an older run")
     os.utime(job.volume, (1000.0, 1000.0))

@@ -1,7 +1,5 @@
 from parameterize.optimization import newton
 from parameterize.optimization.newton import LEAST_STEPS, StoppingRule
-from parameterize.optimization.phases import Schedule
-from parameterize.optimization.rounds import _StepReport
 
 
 def test_damping_grows_while_steps_are_cut_and_goes_once_they_are_whole():
@@ -11,18 +9,6 @@ def test_damping_grows_while_steps_are_cut_and_goes_once_they_are_whole():
         found.append(damping)
     first, factor = newton._DAMPING, newton._DAMPING_GROWTH
     assert found == [0.0, first, factor * first, factor * first, first, 0.0, 0.0]
-
-
-def expected(number, step, most=60):
-    report = _StepReport(number, most, Schedule((), 9, usual_steps=(40, 30, 10)), None, None)
-    report.step = step
-    return report._expected_steps()
-
-
-def test_the_steps_left_are_those_of_a_usual_run():
-    assert [expected(0, step) for step in (0, 38, 39, 55)] == [79, 41, 41, 41]
-    assert expected(2, 3) == 6 and expected(7, 0) == LEAST_STEPS - 1
-    assert expected(0, 0, most=20) == 19 + 20 + 10
 
 
 def steps_until_the_end(rule, gains):

@@ -87,7 +87,7 @@ def test_every_ending_has_a_name_and_a_sentence():
 def test_the_penalty_grows_by_the_rounds_of_the_stage():
     phase = Shape((1.0, 5.0))
     assert [phase.penalty(number) for number in range(3)] == [1.0, 5.0, 5.0]
-    assert Schedule((GROW, UNFOLD), 9, ()).grown == 2 and Schedule((SHAPE, UNFOLD), 9, ()).grown == 0
+    assert Schedule((GROW, UNFOLD), 9).grown == 2 and Schedule((SHAPE, UNFOLD), 9).grown == 0
 
 
 def test_courses_of_one_stage_on_two_sets_of_knots_are_added():

@@ -26,7 +26,7 @@ from parameterize.surface.geometry import vertex_quadrics, vertex_weights
 
 DESCEND = "parameterize.optimization.rounds.descend"
 CONFIG = SplineConfig(control_points=7, steps=5)
-SCHEDULE = Schedule((Shape(RAMP), Unfold(RAMP, far=1.0), Separate(RAMP), Polish(RAMP)), rounds=6, usual_steps=())
+SCHEDULE = Schedule((Shape(RAMP), Unfold(RAMP, far=1.0), Separate(RAMP), Polish(RAMP)), rounds=6)
 KNOTS = (open_uniform_knots(7, 3),) * 3
 NETS = Nets(3, (KNOTS,))
 ALL_SPANS = in_blocks([np.indices((4, 4, 4)).reshape(3, -1).T])

@@ -22,7 +22,7 @@ from parameterize.optimization.term import Weights
 from parameterize.progress import History
 from parameterize.spline.multipatch import MultiPatch
 
-SCHEDULE = Schedule((Shape(), Unfold(), Separate(), Polish(rounds=1)), rounds=6, usual_steps=())
+SCHEDULE = Schedule((Shape(), Unfold(), Separate(), Polish(rounds=1)), rounds=6)
 
 
 @cache

@@ -25,7 +25,7 @@ from parameterize.spline.spline_map import SplineMap
 from parameterize.surface.geometry import vertex_quadrics, vertex_weights
 
 CONFIG = SplineConfig(control_points=6, steps=12)
-SCHEDULE = Schedule((Shape(RAMP), Unfold(RAMP), Separate(RAMP), Polish(RAMP, rounds=1)), rounds=7, usual_steps=())
+SCHEDULE = Schedule((Shape(RAMP), Unfold(RAMP), Separate(RAMP), Polish(RAMP, rounds=1)), rounds=7)
 KNOTS = (open_uniform_knots(6, 3),) * 3
 OWN = 300
 

@@ -23,7 +23,7 @@ from parameterize.spline.multipatch import MultiPatch, shared_numbers
 from parameterize.surface.surface import surface_from_arrays
 
 CONFIG = SplineConfig(steps=5)
-SCHEDULE = Schedule((Shape(), Unfold(), Separate(), Polish(rounds=1)), rounds=6, usual_steps=())
+SCHEDULE = Schedule((Shape(), Unfold(), Separate(), Polish(rounds=1)), rounds=6)
 OPTIONS = {"tolerance": 1e-9, "max_control_points": 6}
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-import math
 import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -17,7 +16,7 @@ from rich.progress import Progress as Bar
 from rich.table import Column
 from rich.text import Text
 
-from ..rounding import rounded
+from ..rounding import clock, rounded
 from ..workflow.worker_run import logged
 
 if TYPE_CHECKING:
@@ -49,21 +48,29 @@ class Display:
             disable=not console.is_terminal,
         )
         self._task = self.bar.add_task("", total=None, state="", ended="", visible=False)
-        self._stage, self._printed = "", time.monotonic()
+        self._stage, self._begun = "", time.monotonic()
+        self._printed = self._begun
 
     def show(self, line: str, stage: str = "", **now: Any) -> None:
         """Show a new state of the command, as a line and as the present task of the bar."""
         self.bar.update(self._task, visible=True, **now)
         if self.bar.disable and (stage != self._stage or time.monotonic() - self._printed >= PLAIN_INTERVAL):
-            self.bar.console.print(Text(line), soft_wrap=True)
             self._stage, self._printed = stage, time.monotonic()
+            self.bar.console.print(Text(f"{line}; {clock(self._printed - self._begun)} passed"), soft_wrap=True)
 
 
 def tell_run(show: Show, now: Progress) -> None:
-    """Show the state of a run: the stage, its steps, folded samples, time left and loss."""
-    state = describe(now)
-    line = f"{now.stage:8s} step {now.step}/{now.steps}, {state}"
-    show(line, now.stage, description=now.stage, completed=now.step, total=now.steps, state=state)
+    """Show the state of a run: the stage, its steps, folded samples, the time left of a training, and the loss."""
+    state, total = describe(now), now.steps if now.seconds_left is not None else None
+    steps = f"{now.step}/{total}" if total else str(now.step)  # other stages end once they gain nothing more
+    show(
+        f"{now.stage:8s} step {steps}, {state}",
+        now.stage,
+        description=now.stage,
+        completed=now.step,
+        total=total,
+        state=state,
+    )
 
 
 def tell_batch(show: Show, batch: Batch, running: Sequence[Running]) -> None:
@@ -79,12 +86,10 @@ def tell_batch(show: Show, batch: Batch, running: Sequence[Running]) -> None:
 
 
 def describe(progress: Progress) -> str:
-    """Return folded samples, time left and loss as text; the seconds of the spline fit are known only while it runs."""
-    minutes, seconds = divmod(math.ceil(max(0.0, progress.seconds_left)), 60)
-    left = f"{minutes}:{seconds:02d} left"
+    """Return folded samples, the time left of the training while it runs, and the loss as text."""
     folds = f"{progress.folded} fold{'s' * (progress.folded != 1)}"
-    when = f"about {left}" if progress.stage == "spline" else f"{left}, then the spline fit"
-    return f"{folds}, {when}, loss {progress.loss:.3e}"
+    left = "" if progress.seconds_left is None else f", {clock(progress.seconds_left)} of the training left"
+    return f"{folds}{left}, loss {progress.loss:.3e}"
 
 
 class _ConsoleHandler(logging.Handler):

@@ -22,7 +22,6 @@ from ..errors import one_line
 from ..options import ProblemOptions
 from ..workflow.output_folder import default_folder, has_checkpoint
 from ..workflow.worker_run import Ended
-from .course import Course
 from .worker import Message, Step
 
 log = logging.getLogger(__name__)
@@ -57,7 +56,6 @@ class Job:
     mapped: Array | None = None
     losses: list[float] = field(default_factory=list)
     log: list[str] = field(default_factory=list)
-    course: Course = field(default_factory=Course)
     begun: float = 0.0
     stop: Event = field(default_factory=Event)
     turn: Future[None] | None = None
@@ -85,9 +83,8 @@ class Job:
     def begin(self) -> None:
         """Forget the run before this one, unless this one continues from its checkpoint."""
         self.state, self.text, self.begun = "running", "", time.time()
-        self.course.pause()
         if not has_checkpoint(self.results):
-            self.course, self.progress, self.mapped = Course(), None, None
+            self.progress, self.mapped = None, None
             self.losses.clear()
             self.log.clear()
 
@@ -235,8 +232,7 @@ class Jobs:
             self._changed(job)
 
     def _take(self, job: Job, step: Step) -> None:
-        job.progress = now = step.progress
-        job.course.tell(now.seconds_left + (now.seconds_after or 0.0))
+        job.progress = step.progress
         if step.mapped is not None and job.surface is not None:
             job.mapped = step.mapped[: len(job.surface.vertices)]
             job.losses.append(step.progress.loss)

@@ -2,6 +2,7 @@
 
 import base64
 import math
+import time
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,7 @@ from parameterize.surface.surface import Surface
 from ..figures.evaluate import FACE_COLORS
 from ..options import ProblemOptions
 from ..report.artifacts import ARTIFACTS
+from ..rounding import clock
 from ..workflow.output_folder import has_checkpoint
 from . import form
 from .queue import DELETED, STARTS, Job
@@ -70,7 +72,7 @@ def row(job: Job, before: int, statement: ProblemOptions) -> dict[str, Any]:
         said["notices"] = list(job.surface.notices)
     if job.progress is not None:
         said["facts"] = _facts(job, job.progress)
-        said["share"] = job.course.share
+        said["share"] = None if job.is_mapped else _share(job.progress)
         said["curve"] = _curve(job.losses)
     return said
 
@@ -88,7 +90,7 @@ def is_ahead(job: Job) -> bool:
 def _facts(job: Job, now: Progress) -> list[list[str]]:
     """Return the facts of a run on the page: the name of each, its value and a remark."""
     is_spline = now.stage == "spline"
-    step = f"step {now.step}" if is_spline else f"step {now.step} of {now.steps}"  # their number is not known
+    step = f"step {now.step}" + (f" of {now.steps}" if now.seconds_left is not None else "")
     stage = [LAST, "the volume is made"] if job.is_mapped else [STAGES.get(now.stage, now.stage), step]
     aim = "between them the proof decides" if is_spline else "0 is the aim"
     facts = [
@@ -97,14 +99,15 @@ def _facts(job: Job, now: Progress) -> list[list[str]]:
         ["Folds at samples", f"{now.folded:,}", aim],
     ]
     if job.state == "running":
-        facts.insert(1, ["Time left", *_time_left(job.course.left)])
+        left = None if job.is_mapped else now.seconds_left
+        remark = "how much is left is not known" if left is None else f"{clock(left)} of the training left"
+        facts.insert(1, ["Time passed", clock(time.time() - job.begun), remark])
     return facts
 
 
-def _time_left(seconds: float | None) -> list[str]:
-    if seconds is None:
-        return ["not known", "longer than usual"]
-    return ["{}:{:02d}".format(*divmod(math.ceil(seconds), 60)), "about, until the report"]
+def _share(now: Progress) -> float | None:
+    """Return the share of the present stage that is done; None for a stage that ends once it gains nothing more."""
+    return None if now.seconds_left is None else now.step / now.steps
 
 
 def _files(job: Job) -> list[dict[str, Any]]:

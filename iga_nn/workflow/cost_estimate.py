@@ -2,8 +2,8 @@
 
 The cost of a run follows from counts and the time of two small pieces of work on all threads: a pass (the network
 forward and backward on 1000 points) and a product with the second derivative of the spline's distortion. The number of
-these pieces in a run was measured on conch and duck, and for hard surfaces on bone and homer. The cost of a solve
-follows from counts alone.
+these pieces in a run was measured on conch and duck, and for hard surfaces on bone and homer. For bodies that take
+another way than these, none is known, and no time is told. The cost of a solve follows from counts alone.
 """
 
 from __future__ import annotations
@@ -48,7 +48,6 @@ REST = 1000.0  # libraries loaded, figures drawn
 # Products
 NEWTON_STEP, CERTIFICATE, FIT = 55.0, 270.0, 500.0
 EASY, HARD = (5, 13), (15, 20)  # rounds, and Newton steps a round, on all control points
-BLOCKS = (0.15, 0.75)  # of one cube's control points: what few blocks have, and many
 HARD_AFTER = (3, 14)  # rounds, and Newton steps a round, after each insertion of knots
 
 # Megabytes
@@ -65,19 +64,19 @@ EVERYWHERE = 3  # an unknown: the solution, whole on every process
 class Forecast:
     """Hold the cost of one start, the section `estimate` of report.json.
 
-    seconds: the seconds for an easy and for a hard surface. memory_mb: the peak of the resident memory. after: for an
-    easy surface, the seconds after the training and the seconds after the spline stage.
+    seconds: the seconds for an easy and for a hard surface, None for a body that takes another way. memory_mb: the peak
+    of the resident memory. other_way: that way in words.
     """
 
-    seconds: tuple[float, float]
+    seconds: tuple[float, float] | None
     memory_mb: float
-    after: tuple[float, float] = (0.0, 0.0)
-
-    def seconds_after(self, stage: str) -> float:
-        """Return the seconds of a usual run after the training stages, or after the stage "spline"."""
-        return self.after[stage == "spline"]
+    other_way: str = ""
 
     def __str__(self) -> str:
+        if self.seconds is None:
+            return (
+                f"no forecast of the time for {self.other_way} yet, {rounded(self.memory_mb / 1000.0, 1)} GB of memory"
+            )
         low, high = self.seconds
         unit, size = ("minute", 60.0) if high >= 90.0 else ("second", 1.0)
         first, last = max(1, round(low / size)), max(1, round(high / size))
@@ -98,8 +97,7 @@ def forecast(
 
     unknowns: the number of unknowns of the largest problem that is solved afterwards. corners: whether the user gives
     corners: those are of one cube that is trained, also where planes bound the body. A second start, where the first
-    map is not certified, takes the same time again. A body with handles has blocks, which are not trained; exact blocks
-    are not optimised either.
+    map is not certified, takes the same time again. Exact blocks are neither trained nor optimised.
     """
     from parameterize.polyhedra.layout import division_of
     from parameterize.training.backend import one_thread_an_operation
@@ -107,32 +105,57 @@ def forecast(
 
     spline, vertices = config.spline, len(surface.vertices)
     points = points_of_a_step(surface.unit_vertices, surface.faces, config.train)
+    is_exact = not corners and division_of(surface, config.blocks) is not None
+    most = spline.control_points if config.refinement is None or is_exact else config.refinement.max_control_points
+    activations = 8 * points * config.network.width * (2 * config.network.modules + 3) / 1e6
+    mapped = PER_CONTROL_POINT * most**3 + PER_VERTEX * vertices
+    memory = LIBRARIES + FIGURES + max(activations, mapped, PER_UNKNOWN * unknowns)
+    if not is_exact and (way := _other_way(surface, config, corners)):
+        return Forecast(None, memory, way)
     with one_thread_an_operation():  # as the run does: a helping thread keeps its first settings
         one_pass = _pass_seconds(config, device, clock)
         product = _product_seconds(spline, clock) + CALLS * one_pass
     last = (REST + LAST_VERTEX * vertices + UNKNOWN * unknowns) * one_pass
     step = NEWTON_STEP * product + NEWTON_VERTEX * vertices * one_pass
-    in_blocks = surface.genus > 0
-    is_exact = not corners and division_of(surface, config.blocks) is not None
     fits = [
-        share * (FIT * product + min(rounds, spline.rounds) * (min(steps, spline.steps) * step + CERTIFICATE * product))
-        for (rounds, steps), share in zip((EASY, HARD), BLOCKS if in_blocks else (1.0, 1.0), strict=True)
+        FIT * product + min(rounds, spline.rounds) * (min(steps, spline.steps) * step + CERTIFICATE * product)
+        for rounds, steps in (EASY, HARD)
     ]
     if is_exact:
         fits = [CERTIFICATE * product] * 2
-    steps_of_training = (0, 0) if in_blocks or is_exact else _training_steps(config, corners)
+    steps_of_training = (0, 0) if is_exact else _training_steps(config, corners)
     trainings = [count * TRAINING_STEP * points * one_pass for count in steps_of_training]
     low, high = sorted(training + fit + last for training, fit in zip(trainings, fits, strict=True))
-    most = spline.control_points
     if config.refinement is not None and not is_exact:  # it may end with the first spline, or only at its limit
-        most = config.refinement.max_control_points
         rounds, steps = HARD_AFTER
         growths = _growths(config.refinement.max_control_points, spline.control_points)
         high += sum(growths) * rounds * (min(steps, spline.steps) * step + CERTIFICATE * product)
-    activations = 8 * points * config.network.width * (2 * config.network.modules + 3) / 1e6
-    mapped = PER_CONTROL_POINT * most**3 + PER_VERTEX * vertices
-    memory = LIBRARIES + FIGURES + max(activations, mapped, PER_UNKNOWN * unknowns)
-    return Forecast((low, high), memory, (fits[0] + last, last))
+    return Forecast((low, high), memory)
+
+
+def _other_way(surface: Surface, config: Config, corners: bool) -> str:
+    """Return in words which way a body takes, or may take, instead of a cube that is trained; "" where it takes none.
+
+    Only what takes a second is looked at: which limbs a long body has, for one, takes longer.
+    """
+    from parameterize.columns.stack import stack_of
+    from parameterize.columns.tapers import tapered_stack_of
+    from parameterize.starts.start import COMPACT, Task
+
+    if surface.genus or (config.blocks or 1) > 1:
+        return "blocks"
+    task = Task(surface, config, 0, "cpu", "float32", None, {}, {})
+    points, faces = surface.to_unit(surface.vertices), surface.faces
+    if (
+        not corners
+        and config.blocks != 1
+        and (stack_of(points, faces) or tapered_stack_of(points, faces, surface.sharp))
+    ):
+        return "blocks of extrusions"
+    if config.starts > 1 and task.ridges is not None:
+        return "layouts along sharp edges"
+    is_long = config.blocks is None and not corners and task.compactness >= COMPACT
+    return "bodies with limbs, which may become blocks" if is_long else ""
 
 
 def _training_steps(config: Config, corners: bool) -> tuple[float, float]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import logging
 from collections.abc import Callable
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,7 +16,7 @@ from parameterize.arrays import Array, IntArray
 from parameterize.checkpoint import differing
 from parameterize.compilation import compilation_told
 from parameterize.files import array_names, load_arrays, save_arrays
-from parameterize.progress import Progress, ProgressCallback
+from parameterize.progress import ProgressCallback
 from parameterize.spline.multipatch import MultiPatch
 from parameterize.spline.volume import FACE_NAMES
 from parameterize.surface.geometry import vertex_normals
@@ -115,7 +115,7 @@ def map_surface(
 
     with compilation_told():
         expected = _prepare(state, given, mapping, problem, unknowns)
-        result = _train(given, expected, mapping, progress, made, state.folder / CHECKPOINT)
+        result = _train(given, mapping, progress, made, state.folder / CHECKPOINT)
     state.seconds.update(result.seconds)
     _write(state, given, expected, result, mapping)
     _draw_defects(state, result)
@@ -272,7 +272,6 @@ def _check_somewhere(evaluate: Callable[[Array, Array], object], points: Array, 
 
 def _train(
     given: MapInput,
-    expected: Forecast,
     mapping: MapOptions,
     progress: ProgressCallback | None,
     made: MadeCallback,
@@ -288,10 +287,6 @@ def _train(
     from parameterize.run import parameterize
     from parameterize.skeleton.graph import SkeletonError
 
-    def tell(now: Progress) -> None:
-        if progress is not None:
-            progress(replace(now, seconds_after=expected.seconds_after(now.stage)))
-
     try:
         return parameterize(
             given.surface,
@@ -299,7 +294,7 @@ def _train(
             seed=mapping.seed,
             device=mapping.device,
             corners=given.corners,
-            progress=tell,
+            progress=progress,
             when_made=made,
             checkpoint_dir=checkpoint,
             resume=mapping.resume,

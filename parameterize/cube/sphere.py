@@ -19,6 +19,7 @@ from scipy.sparse.csgraph import dijkstra
 from scipy.sparse.linalg import eigsh, splu
 
 from ..arrays import Array, IntArray, Mask
+from ..checkpoint import Checkpoints
 from ..progress import Progress, ProgressCallback, ignore
 from ..surface.geometry import edge_table, normals_and_areas
 from .cutting import split_edges
@@ -38,20 +39,44 @@ _AWAY = 10.0  # extra weight of edges pointing away from the rim, in the second 
 _POWERS = (2, 4, 8, 16, 32, 64)
 _ONE_WAY_POWERS = (4, 16)  # in the last layouts, where a point is pulled by neighbours nearer to the rim alone
 _STEPS = 300  # Newton steps, at most
-_USUAL_STEPS = 30  # Newton steps of most surfaces, from which the time left is estimated
+_CHECKPOINT, _CHECKPOINT_SECONDS = "sphere", 5.0
 _DAMPING = 1e-8  # of a Newton step, as a share of the mean diagonal entry
 _LEAST_GAIN = 1e-3  # share of the energy: the steps end once one of them gains less
 _SHORTEST_STEP = 1e-10  # share of a Newton step
 _ARMIJO = 1e-4  # share of the decrease that the slope promises which a step must reach
 
 
-def lay_on_sphere(vertices: Array, faces: IntArray, progress: ProgressCallback = ignore) -> CubeLayout:
+def lay_on_sphere(
+    vertices: Array,
+    faces: IntArray,
+    progress: ProgressCallback = ignore,
+    checkpoints: Checkpoints | None = None,
+) -> CubeLayout:
     """Return the layout on the unit sphere of a closed surface without handles.
 
     vertices: (n, 3). faces: (m, 3), outward triangles. Every mesh edge that the line between the two discs crosses has
     a new vertex, after the vertices of the mesh. `progress` is called after each Newton step, with the stage "layout"
-    and the energy as the loss.
+    and the energy as the loss. A checkpoint is kept every few seconds, and where the steps are interrupted.
     """
+    checkpoints = checkpoints or Checkpoints.none()
+    if (saved := checkpoints.load(_CHECKPOINT)) is not None:
+        arrays, state = saved
+        points, faces, directions, steps = arrays["points"], arrays["faces"], arrays["directions"], state["steps"]
+        triangles = _Triangles(points, faces)
+    else:
+        points, faces, directions, triangles = _first_layout(vertices, faces)
+        steps = 0
+
+    def keep(directions: Array, steps: int) -> None:
+        arrays = {"points": points, "faces": faces, "directions": directions}
+        checkpoints.save(_CHECKPOINT, arrays, {"steps": steps})
+
+    relaxed = _relaxed(directions, triangles, progress, steps, keep)
+    return CubeLayout(points, faces, relaxed, len(vertices))
+
+
+def _first_layout(vertices: Array, faces: IntArray) -> tuple[Array, IntArray, Array, "_Triangles"]:
+    """Return the points (n, 3) of the cut surface, its triangles (m, 3), first directions (n, 3), and all as one."""
     points, faces, upper = _halves(vertices, faces)
     triangles = _Triangles(points, faces)
     directions = _hemispheres(points, faces, upper, lambda straight, *_: np.ones(len(straight)))
@@ -59,7 +84,7 @@ def lay_on_sphere(vertices: Array, faces: IntArray, progress: ProgressCallback =
         if triangles.energy(directions) <= _SQUEEZED:
             break
         directions = min(directions, _hemispheres(points, faces, upper, weigh), key=triangles.energy)
-    return CubeLayout(points, faces, _relaxed(directions, triangles, progress), len(vertices))
+    return points, faces, directions, triangles
 
 
 def _halves(vertices: Array, faces: IntArray) -> tuple[Array, IntArray, Mask]:
@@ -231,40 +256,59 @@ def _area_bends(corners: Array) -> Array:
     return bends
 
 
-def _relaxed(directions: Array, triangles: _Triangles, progress: ProgressCallback = ignore) -> Array:
+def _relaxed(
+    directions: Array,
+    triangles: _Triangles,
+    progress: ProgressCallback = ignore,
+    done: int = 0,
+    keep: Callable[[Array, int], None] = lambda *_: None,
+) -> Array:
     """Return directions of lower energy by Newton steps, which are shortened until no triangle turns over.
 
     A step is also shortened until the energy falls. Directions with triangles too small for double precision are
-    returned unchanged.
+    returned unchanged. done: the number of steps that have led to the directions. keep: a function that keeps
+    directions and this number for a run that resumes.
     """
     energy = triangles.energy(directions)
+    if not math.isfinite(energy):
+        return directions
+    reached, kept = (directions, done), time.monotonic()
+    try:
+        while reached[1] < _STEPS and (found := _stepped(directions, energy, triangles)) is not None:
+            gain, number = energy - found[1], reached[1] + 1
+            directions, energy = found
+            reached = directions, _STEPS if gain < _LEAST_GAIN * energy else number
+            progress(Progress("layout", number, _STEPS, energy, 0, None))
+            if time.monotonic() - kept > _CHECKPOINT_SECONDS:
+                keep(*reached)
+                kept = time.monotonic()
+    except KeyboardInterrupt:
+        keep(*reached)
+        raise
+    keep(directions, _STEPS)
+    return directions
+
+
+def _stepped(directions: Array, energy: float, triangles: _Triangles) -> tuple[Array, float] | None:
+    """Return the directions after a Newton step, and their energy; None where it does not fall."""
     unknowns = (2 * triangles.faces[:, :, None] + np.arange(2)).reshape(-1, 6)
     rows, columns = np.repeat(unknowns, 6, axis=1).ravel(), np.tile(unknowns, (1, 6)).ravel()
     size = 2 * len(directions)
-    for number in range(_STEPS if math.isfinite(energy) else 0):
-        begun = time.perf_counter()
-        tangents = _tangents(directions)
-        slopes, hessians = triangles.derivatives(directions, tangents)
-        slope = np.asarray(np.bincount(unknowns.ravel(), slopes.ravel(), size), dtype=np.float64)
-        matrix = coo_array((hessians.ravel(), (rows, columns)), shape=(size, size)).tocsc()
-        damping = _DAMPING * matrix.diagonal().mean()
-        step = _solved(csc_array(matrix + damping * eye_array(size)), -slope)
-        move, length = np.einsum("nca,na->nc", tangents, step.reshape(-1, 2)), 1.0
-        while length > _SHORTEST_STEP:
-            trial = directions + length * move
-            trial /= np.linalg.norm(trial, axis=1, keepdims=True)
-            lower = triangles.energy(trial)
-            if lower <= energy + _ARMIJO * length * float(slope @ step):
-                break
-            length *= 0.5
-        else:
-            break
-        gain, directions, energy = energy - lower, trial, lower
-        left = max(_USUAL_STEPS - number, 1) * (time.perf_counter() - begun)
-        progress(Progress("layout", number + 1, _STEPS, energy, 0, left))
-        if gain < _LEAST_GAIN * energy:
-            break
-    return directions
+    tangents = _tangents(directions)
+    slopes, hessians = triangles.derivatives(directions, tangents)
+    slope = np.asarray(np.bincount(unknowns.ravel(), slopes.ravel(), size), dtype=np.float64)
+    matrix = coo_array((hessians.ravel(), (rows, columns)), shape=(size, size)).tocsc()
+    damping = _DAMPING * matrix.diagonal().mean()
+    step = _solved(csc_array(matrix + damping * eye_array(size)), -slope)
+    move, length = np.einsum("nca,na->nc", tangents, step.reshape(-1, 2)), 1.0
+    while length > _SHORTEST_STEP:
+        trial = directions + length * move
+        trial /= np.linalg.norm(trial, axis=1, keepdims=True)
+        lower = triangles.energy(trial)
+        if lower <= energy + _ARMIJO * length * float(slope @ step):
+            return trial, lower
+        length *= 0.5
+    return None
 
 
 def _tangents(directions: Array) -> Array:

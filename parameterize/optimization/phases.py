@@ -215,14 +215,12 @@ class Polish(Phase):
 class Schedule:
     """Hold the phases of a spline stage in their order, and the limits that they share.
 
-    rounds: the largest number of rounds in the stage. usual_steps: the number of Newton steps in the rounds of most
-    runs, from which the time left is estimated. gain: a share of the energy; a round ends where its steps lower the
-    energy by less.
+    rounds: the largest number of rounds in the stage. gain: a share of the energy; a round ends where its steps lower
+    the energy by less.
     """
 
     phases: tuple[Phase, ...]
     rounds: int
-    usual_steps: tuple[int, ...]
     gain: float = GAIN
 
     @property

@@ -5,8 +5,7 @@ certified, and unproved spans receive new weights.
 """
 
 import logging
-import time
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 from ..arrays import IntArray
 from ..checkpoint import Checkpoints
@@ -16,7 +15,7 @@ from ..spline.spline_map import SplineMap
 from ..threads import one_blas_thread
 from .endings import Course, Reason
 from .energy import SplineEnergy
-from .newton import FIRST_GAIN, LEAST_STEPS, Point, StoppingRule, descend
+from .newton import FIRST_GAIN, Point, StoppingRule, descend
 from .optimized import Optimized
 from .phases import GIVING_WAY, PATIENT_ROUNDS, Phase, Schedule
 from .spans import edge_spans
@@ -52,7 +51,7 @@ def optimize(
     `start`. A checkpoint is kept after every round. After the call, the surface's parameters belong to the returned
     map.
     """
-    checkpoints = checkpoints or Checkpoints(None, {}, resume=False)
+    checkpoints = checkpoints or Checkpoints.none()
     with one_blas_thread():
         energy = SplineEnergy(start.nets, surface, weights)
         energy.determinants.activate(edge_spans(start.nets))
@@ -115,20 +114,11 @@ class _StepReport:
     history: History
     progress: ProgressCallback
     step: int = 0
-    begun: float = field(default_factory=time.perf_counter)
 
     def __call__(self, point: Point) -> None:
         """Report the point after a step."""
         done, loss = self.number * self.most + self.step, point.total
         self.history.add("spline", done, loss, point.folded, {"surface": point.outer[0]})
-        before, self.begun = self.begun, time.perf_counter()
-        steps = max(self.number + 1, len(self.schedule.usual_steps)) * self.most
-        left = (self.begun - before) * self._expected_steps()
-        self.progress(Progress("spline", done + 1, steps, loss, point.folded, left))
+        steps = self.schedule.rounds * self.most  # at most: a round ends once it gains nothing more
+        self.progress(Progress("spline", done + 1, steps, loss, point.folded, None))
         self.step += 1
-
-    def _expected_steps(self) -> int:
-        """Return the number of steps that are left after this one in a usual run; hard shapes need more."""
-        usual = [min(count, self.most) for count in self.schedule.usual_steps]
-        present = usual[self.number] if self.number < len(usual) else LEAST_STEPS
-        return max(present - self.step - 1, 1) + sum(usual[self.number + 1 :])

@@ -27,12 +27,12 @@ from ..spline.spline_map import SplineMap
 from ..surface.geometry import vertex_quadrics, vertex_weights
 from ..threads import one_blas_thread
 from .growth import STEPS, Grow
+from .kept_blocks import kept_blocks
 from .on_cube import MORE_ROUNDS
 from .start import MOST_POINTS, Attempt, Start, Task, optimized
 
 _log = logging.getLogger(__name__)
 
-_USUAL_STEPS = (20, 8, 8, 8)  # of Newton's method in the later rounds of most runs: tells the time left
 _FACE_SHARES = (1e-3, 1e-2, 0.1)  # of the weight of the surface's data while the faces are drawn to it, round by round
 _POINT_SHARES = (0.01, 0.1)  # the same while the surface's points draw F, before they have all their weight
 _LONGEST = 0.055  # length at volume 1 above which the mesh's edges are cut: about a span across a block
@@ -62,7 +62,8 @@ class AlongSkeleton(Start):
         needed = task.surface.genus > 0 or task.config.blocks is not None
         with timed(task.seconds, "fit"), one_blas_thread():
             try:
-                first = thin_blocks(task.layout, task.config.spline.degree)
+                degree = task.config.spline.degree
+                first = kept_blocks(checkpoints, task.choice, lambda: thin_blocks(task.layout, degree))
             except LayoutError as error:
                 if needed:
                     raise
@@ -84,7 +85,7 @@ def softened(stiff: Attempt, task: Task, checkpoints: Checkpoints) -> Attempt:
     if any(stiff.found.faults):
         return stiff
     spline = stiff.found.spline
-    rounds = Schedule((Polish(),), _SOFT_ROUNDS, _USUAL_STEPS)
+    rounds = Schedule((Polish(),), _SOFT_ROUNDS)
     soft = optimized(spline, stiff.fit.on_nets(spline.nets), rounds, task, checkpoints.of_part("soft"))
     soft = replace(soft, course=soft.course.after(stiff.course))
     return min(soft, stiff, key=lambda attempt: attempt.rank)
@@ -104,7 +105,7 @@ def schedule(
     shares, steps = face_shares + point_shares, scaled_steps(STEPS, config.steps_factor)
     growing = Approach(shares=face_shares, steps=steps), Grow(shares=shares, steps=steps)
     phases = *growing, Unfold(far=_FAR, far_first=_FAR), Separate(far=_FAR), Polish()
-    return Schedule(phases, len(shares) + config.spline.rounds + MORE_ROUNDS, (steps,) * len(shares) + _USUAL_STEPS)
+    return Schedule(phases, len(shares) + config.spline.rounds + MORE_ROUNDS)
 
 
 def thin_blocks(layout: BlockLayout, degree: int) -> SplineMap:

@@ -79,8 +79,9 @@ def _of_body(task: Task, vertices: Array, faces: IntArray, checkpoints: Checkpoi
     """
     surface = surface_from_arrays(vertices, faces, f"{task.surface.name} without handles")
     config = replace(task.config, blocks=1, refinement=None).with_control_points(_CONTROL_POINTS)
-    own = replace(task, surface=surface, config=config, given_corners=None)
-    grown = GROWTH.make(own, checkpoints.of_part("body"))
+    kept = checkpoints.of_part("body")
+    own = replace(task, surface=surface, config=config, given_corners=None, checkpoints=kept)
+    grown = GROWTH.make(own, kept)
     spline = grown.found.spline
     return spline.with_control(surface.from_unit(spline.control.T).T), grown.course
 

@@ -4,6 +4,8 @@ from dataclasses import dataclass
 
 from ..checkpoint import Checkpoints
 from ..optimization.endings import Reason
+from ..spline.spline_map import SplineMap
+from .kept_blocks import kept_blocks
 from .planes import kept
 from .start import Attempt, Start, Task
 
@@ -13,10 +15,13 @@ class StackOfExtrusions(Start):
     """Make a map of columns, which is certified and left as it is."""
 
     def make(self, task: Task, checkpoints: Checkpoints) -> Attempt:
-        """Return the attempt whose map is the task's columns. It takes seconds, and keeps no checkpoints."""
-        columns = task.columns
-        assert columns is not None, "this start follows where the choice is columns"
-        return kept(task, columns.spline, Reason.LAID)
+        """Return the attempt whose map is the task's columns, which a checkpoint keeps."""
+
+        def lay() -> SplineMap:
+            assert task.columns is not None, "this start follows where the choice is columns"
+            return task.columns.spline
+
+        return kept(task, kept_blocks(checkpoints, task.choice, lay), Reason.LAID)
 
 
 COLUMNS = StackOfExtrusions("columns", "columns", "laying blocks along the outlines of extrusions")

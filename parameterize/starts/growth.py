@@ -25,7 +25,7 @@ from ..spline.spline_map import SplineMap
 from ..spline.volume import BSplineVolume
 from ..surface.geometry import vertex_weights
 from ..threads import one_blas_thread
-from .on_cube import MORE_ROUNDS, USUAL_STEPS, surface_on_cube
+from .on_cube import MORE_ROUNDS, surface_on_cube
 from .start import Attempt, Start, Task, optimized
 
 # Of the weight of the surface's data, round by round: two a decade, so that F follows without a fold.
@@ -84,7 +84,7 @@ class Growth(Start):
             Separate(firm=self.firm, far=max(Separate.far, self.far)),
             Polish(),
         )
-        return Schedule(phases, grown + config.spline.rounds + MORE_ROUNDS, (steps,) * grown + USUAL_STEPS)
+        return Schedule(phases, grown + config.spline.rounds + MORE_ROUNDS)
 
 
 GROWTH = Growth("growth", "growth", "growing a map from a cube")

@@ -22,7 +22,6 @@ from .start import Attempt, Start, Task, optimized
 _log = logging.getLogger(__name__)
 
 _FEW_FLIPS = 1e-2  # with a larger share of flipped triangles the surface is cut along traced cube edges
-_USUAL_STEPS = (13, 21, 27, 7, 6, 6)  # of the rounds of most runs: tells the time left
 
 
 @dataclass(frozen=True)
@@ -67,7 +66,7 @@ NETWORK = Network("network", "network", "training the network")
 
 def schedule(spline: SplineConfig) -> Schedule:
     """Return the phases of the rounds: F starts folded where the network's map is, and the penalties grow slowly."""
-    return Schedule((Shape(RAMP), Unfold(RAMP), Separate(RAMP), Polish(RAMP)), spline.rounds, _USUAL_STEPS)
+    return Schedule((Shape(RAMP), Unfold(RAMP), Separate(RAMP), Polish(RAMP)), spline.rounds)
 
 
 def _layout(mapped: Array, corners: IntArray | None, task: Task) -> CubeLayout:

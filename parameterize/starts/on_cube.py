@@ -12,7 +12,6 @@ from ..cube.turning import best_turn
 from .start import MOST_POINTS, Task
 
 MORE_ROUNDS = 4  # than after a trained network: such shapes are hard
-USUAL_STEPS = (40, 12, 8, 8, 8, 7, 6, 6, 6)  # of Newton's method in the rounds of most runs: tells the time left
 
 
 def surface_on_cube(task: Task, turn: int) -> CubeLayout:

@@ -25,6 +25,7 @@ from ..spline.volume import FACE_NAMES
 from ..surface.geometry import vertex_quadrics, vertex_weights
 from ..threads import one_blas_thread
 from .blocks import thin_blocks
+from .kept_blocks import kept_blocks
 from .start import Attempt, Start, Task
 
 
@@ -33,10 +34,13 @@ class BoundedByPlanes(Start):
     """Make a map of exact blocks, which is certified and left as it is."""
 
     def make(self, task: Task, checkpoints: Checkpoints) -> Attempt:
-        """Return the attempt whose map is the task's exact layout. It takes seconds, and keeps no checkpoints."""
-        layout = task.exact
-        assert layout is not None, "this start follows where the choice is planes"
-        return kept(task, thin_blocks(layout, task.config.spline.degree), Reason.EXACT)
+        """Return the attempt whose map is the task's exact layout, which a checkpoint keeps."""
+
+        def lay() -> SplineMap:
+            assert task.exact is not None, "this start follows where the choice is planes"
+            return thin_blocks(task.exact, task.config.spline.degree)
+
+        return kept(task, kept_blocks(checkpoints, task.choice, lay), Reason.EXACT)
 
 
 PLANES = BoundedByPlanes("planes", "planes", "laying exact blocks along the planes")

@@ -20,7 +20,7 @@ from ..progress import timed
 from ..surface.ridges import Ridges
 from ..threads import one_blas_thread
 from .first_spline import COARSE, first_spline
-from .on_cube import MORE_ROUNDS, USUAL_STEPS, surface_on_cube
+from .on_cube import MORE_ROUNDS, surface_on_cube
 from .start import ALL, Attempt, Start, Task, optimized
 
 _log = logging.getLogger(__name__)
@@ -50,7 +50,7 @@ class Sharp(Start):
 
 def schedule(spline: SplineConfig) -> Schedule:
     """Return the phases of the rounds: the first map is close to the last, so folds have a large penalty at once."""
-    return Schedule((Shape(), Unfold(), Separate(), Polish()), spline.rounds + MORE_ROUNDS, USUAL_STEPS)
+    return Schedule((Shape(), Unfold(), Separate(), Polish()), spline.rounds + MORE_ROUNDS)
 
 
 SHARP = Sharp("sharp edges", "extension", "laying the cube's edges along sharp edges")

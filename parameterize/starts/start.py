@@ -3,7 +3,7 @@
 import logging
 import math
 from abc import ABC, abstractmethod
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, Literal
 
@@ -41,6 +41,7 @@ from ..surface.ridges import Ridges
 from ..surface.surface import Surface
 from ..threads import one_blas_thread
 from ..training.samples import interior_points
+from .kept_blocks import kept_choice
 
 _log = logging.getLogger(__name__)
 
@@ -71,6 +72,7 @@ class Task:
     given_corners: IntArray | None
     seconds: dict[str, float]  # by step, of the run so far
     report: dict[str, Any]  # history and progress, as Trainer and optimize take them
+    checkpoints: Checkpoints = field(default_factory=Checkpoints.none)  # of what all starts share
 
     @property
     def own(self) -> int:
@@ -106,8 +108,12 @@ class Task:
         with handles gets blocks. The skeleton of one without handles is looked for only where its surface is much
         larger than a ball's.
 
-        Raises SkeletonError for a body with handles that has no skeleton.
+        That of the checkpoint is taken where its blocks are kept. Raises SkeletonError for a body with handles that has
+        no skeleton.
         """
+        if (kept := kept_choice(self.checkpoints)) is not None:
+            _log.info("%s", kept.reason)
+            return kept
         surface, most = self.surface, self.config.blocks
         if self.exact is not None:
             count = len(self.exact)
@@ -125,9 +131,9 @@ class Task:
         if surface.genus == 0:
             if most is not None or self.given_corners is not None:
                 return Choice("blocks" if (most or 1) > 1 else "cube", "")
-            area = float(normals_and_areas(surface.unit_vertices, surface.faces)[1].sum())
-            if (compactness := area**3 / (36.0 * math.pi)) < COMPACT:
-                return Choice("cube", f"no handles, and a compact body: {compactness:.1f} for a ball's 1: one cube")
+            if self.compactness < COMPACT:
+                figure = f"{self.compactness:.1f} for a ball's 1"
+                return Choice("cube", f"no handles, and a compact body: {figure}: one cube")
         with timed(self.seconds, "fit"), one_blas_thread():
             found = self._by_skeleton()
         _log.info("%s", found.reason)
@@ -141,6 +147,12 @@ class Task:
             if self.surface.genus:
                 raise
             return Choice("cube", f"no handles, and no skeleton ({error}): one cube")
+
+    @cached_property
+    def compactness(self) -> float:
+        """Return the cubed area of the surface at volume 1, over that of a ball."""
+        area = float(normals_and_areas(self.surface.unit_vertices, self.surface.faces)[1].sum())
+        return area**3 / (36.0 * math.pi)
 
     @cached_property
     def handles(self) -> tuple[Handle, ...]:
@@ -203,7 +215,7 @@ class Task:
     def sphere(self) -> CubeLayout:
         """Return the layout of the surface, at volume 1, on the sphere."""
         surface = self.surface
-        return lay_on_sphere(surface.unit_vertices, surface.faces, self.report["progress"])
+        return lay_on_sphere(surface.unit_vertices, surface.faces, self.report["progress"], self.checkpoints)
 
     def fit(self, layout: CubeLayout, coarse: float, kept: Carried | None = None) -> SurfaceFit:
         """Return the surface's points with their first parameters on the boundary of the cube (section 4.3.2, step 1).
