@@ -1,12 +1,13 @@
 """Judges the numbers of a solve: notices on its data, its map, its mesh and its linear solver."""
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
 import numpy as np
 
 from parameterize.arrays import Array
 from parameterize.conjugate_gradients import INDEFINITE, LinearResult
 from parameterize.quality.distortion import scaled_jacobian
+from parameterize.spline.bspline import breakpoints
 from parameterize.spline.orientation import orientation
 from parameterize.spline.volume import AXES, FACE_NAMES, BSplineVolume
 
@@ -16,6 +17,7 @@ from .discretization.space import TrialSpace
 from .field import Points
 from .forms.boundary_value_problem import BoundaryValueProblem
 from .forms.data import in_scaled
+from .forms.elasticity import Elasticity
 from .forms.parser import Expression, ExpressionError
 from .patch_system import PatchProblem, PatchSystem
 from .solution import MultiPatchSolution, Solution
@@ -32,6 +34,10 @@ LARGEST_ERROR = 0.5  # relative L2: beyond it more of the solution is wrong than
 DECISIVE = ("exact", "source", "boundary")  # without these nothing is solved
 INDEFINITE_REMEDY = ", as with a negative reaction; in a law of one's own, set `symmetric = False`, and GMRES solves it"
 EXTREME_REMEDY = ": the numbers of the law or of the map lie too far apart; scale them, or smooth their jumps"
+# Spans that are longer than so many thicknesses lock in bending, by the degree: the deflection of straight and curved
+# cantilevers, 100 and 1000 times as long as thick, is then 2 to 40 % too small (tests/test_diagnostics.py).
+SLENDER = {1: 1.0, 2: 8.0}
+SLENDER_CUBIC = 30.0
 TWO_PROBLEMS = "the errors compare the solutions of two problems"
 
 
@@ -211,7 +217,34 @@ def map_notices(patches: Sequence[PatchSystem], certified: str | None, weaknesse
             wrong = "det J < 0" if orientation(patch.volume) > 0 else "the map is left-handed, and det J > 0"
             where = f" of patch {patch.problem.prefix[:-1]}" if patch.problem.prefix else ""
             notices.append(f"{wrong} at {matrix.folded} of {points} Gauss points{where}: solved with |det J| instead")
+    notices += list(bending_notices(patches))
     return notices + [f"more iterations than usual: {text}" for text in dict.fromkeys(weaknesses) if text]
+
+
+def bending_notices(patches: Sequence[PatchProblem]) -> Iterator[str]:
+    """Yield a notice on the elastic patch with the longest spans over its thickness, where they may lock in bending."""
+    if not patches or not isinstance(patches[0].problem.form, Elasticity):
+        return
+    worst, share, degree, prefix = max((*_slenderness(patch), patch.problem.prefix) for patch in patches)
+    if worst > 1.0:
+        where = f" of patch {prefix[:-1]}" if prefix else ""
+        yield (
+            f"spans{where} are {share:.2g} times as long as the body is thick there: with degree {degree} it may bend "
+            "some 2 to 40 % too little; raise --refine or --degree until its displacement stays"
+        )
+
+
+def _slenderness(patch: PatchProblem) -> tuple[float, float, int]:
+    """Return the longest span of a patch over its thickness, as a share of what its degree allows, and as it is.
+
+    Lengths are those of the control net's lines, in the mean. The last number is the degree along that span.
+    """
+    net = patch.volume.control_points
+    sides = [float(np.linalg.norm(np.diff(net, axis=a), axis=-1).sum(axis=a).mean()) for a in range(3)]
+    spans = [len(breakpoints(knots)) - 1 for knots in patch.space.whole.knots]
+    rows = zip(sides, spans, patch.space.degrees, strict=True)
+    found = [(side / count / min(sides), degree) for side, count, degree in rows]
+    return max((ratio / SLENDER.get(degree, SLENDER_CUBIC), ratio, degree) for ratio, degree in found)
 
 
 def failure(patches: Sequence[PatchProblem], result: LinearResult, caveat: str = "") -> str:

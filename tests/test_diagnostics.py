@@ -213,3 +213,38 @@ def test_the_line_of_a_failed_solve_has_history_and_place():
     assert "residual 1.0e+00 at the start" in line and "after 2 iterations" in line and "\n" not in line
     assert "the map is worst at u=0.9" in line
     assert caught.value.solution.report.notices == (line,)
+
+
+def cantilever(thickness, spans, degree, turn):
+    """A rod of length 1, straight or along an arc, held at u0 and pulled across at its end: its deflection and notices.
+
+    thickness: the side of its square section. turn: the angle of the arc, 0 for a straight rod.
+    """
+
+    def place(u, v, w):
+        if turn == 0.0:
+            return u, thickness * v, thickness * w
+        radius = 1.0 / turn + thickness * (v - 0.5)
+        return radius * np.cos(turn * u), radius * np.sin(turn * u), thickness * w
+
+    rod = BSplineVolume.from_function(place, (spans + degree, degree + 1, degree + 1), degree)
+    free = dict.fromkeys(("v0", "v1", "w0", "w1"), ["0"] * 3) | {"u1": [f"{thickness**2}", "0", f"{thickness**2}"]}
+    solution = solve_problem(rod, Elasticity(traction=free, young=1.0, poisson_ratio=0.0), max_iterations=3000)
+    return float(np.linalg.norm(solution([[1.0, 0.5, 0.5]]))), " ".join(solution.report.notices)
+
+
+@pytest.mark.parametrize(
+    ("coarse", "fine"),
+    [((1e-2, 3, 2, 0.0), (1e-2, 16, 2, 0.0)), ((1e-2, 2, 3, 1.6), (1e-2, 12, 3, 1.6))],
+)
+def test_spans_that_are_much_longer_than_the_body_is_thick_are_named(coarse, fine):
+    (small, notices), (right, silence) = cantilever(*coarse), cantilever(*fine)
+    assert small < 0.9 * right
+    assert "times as long as the body is thick" in notices and f"degree {coarse[2]}" in notices
+    assert "times as long" not in silence
+
+
+def test_short_bodies_and_other_laws_are_not_said_to_be_slender():
+    assert said(UNIT, Elasticity(force=("0", "0", "1"), displacement=("0", "0", "0")))[1] == ""
+    foil = BSplineVolume.from_function(lambda u, v, w: (u, v, 1e-4 * w), 5)
+    assert "thick" not in said(foil, Poisson(source="1", boundary="0"))[1]

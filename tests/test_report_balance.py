@@ -30,9 +30,12 @@ def test_forces_are_told_of_the_finest_level():
 
 
 def test_forces_have_a_unit_where_those_of_stresses_and_lengths_are_known():
-    known = BODY | {"unit": "mm", "stress_unit": "MPa"}
-    assert lines(known)[0] == "load (0, 0, -2) MPa·mm²"
-    assert table(known)[0] == ["", "x [MPa·mm²]", "y [MPa·mm²]", "z [MPa·mm²]"]
+    known = BODY | {"unit": "in", "stress_unit": "ksi"}
+    assert lines(known)[0] == "load (0, 0, -2) ksi·in²"
+    assert table(known)[0] == ["", "x [ksi·in²]", "y [ksi·in²]", "z [ksi·in²]"]
+    for stress, length in (("MPa", "mm"), ("Pa", "m"), ("N/mm²", "mm")):
+        assert lines(BODY | {"unit": length, "stress_unit": stress})[0] == "load (0, 0, -2) N"
+    assert lines(BODY | {"unit": "m", "stress_unit": "MPa"})[0] == "load (0, 0, -2) MPa·m²"
     assert lines(BODY | {"unit": "mm"}) == lines(BODY)
 
 

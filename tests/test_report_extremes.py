@@ -51,6 +51,12 @@ def test_reports_without_extremes(levels):
     assert extremes.growth_notices({"levels": levels * 2}) == []
 
 
+def test_of_a_stress_on_one_level_it_is_said_that_its_growth_is_unknown():
+    (notice,) = extremes.growth_notices({"levels": [level(1.0, von_mises=100.0)]})
+    assert "known on one level alone" in notice and "at (12.5, 0, 3.1)" in notice and "--refine 0 1" in notice
+    assert extremes.growth_notices({"levels": [level(1.0, gradient_magnitude=100.0)]}) == []
+
+
 @pytest.mark.parametrize(
     ("fine", "grows"),
     [(level(0.5, von_mises=109.0), False), (level(0.5, von_mises=111.0), True), (level(0.25, von_mises=120.0), False)],

@@ -25,8 +25,8 @@ def test_regions_and_reactions_are_told_in_terminal_report_and_page(in_folder, c
     assert main(["solve", "elasticity", "cube.npz", *BODY, "--refine", "0", "--quiet", "--out", "out"]) == 0
     said = capsys.readouterr().out.splitlines()
     at = next(i for i, line in enumerate(said) if line.startswith("balance "))
-    assert said[at] == "balance          load (0, 0, -1) MPa·mm²"
-    assert said[at + 1] == f"{'':16s} fix 'z < 1e-6' answers (0, 0, 1) MPa·mm²"
+    assert said[at] == "balance          load (0, 0, -1) N"
+    assert said[at + 1] == f"{'':16s} fix 'z < 1e-6' answers (0, 0, 1) N"
     section = json.loads(Path("out/report.json").read_text())["elasticity"]
     fixed, loaded = section["regions"]
     assert fixed == {"kind": "fix", "region": "z < 1e-6", "data": "0;0;0", "area": pytest.approx(1.0, rel=1e-4)}
@@ -38,7 +38,7 @@ def test_regions_and_reactions_are_told_in_terminal_report_and_page(in_folder, c
     }
     text = Path("out/report.html").read_text().replace("\n", "")
     assert "<td>load</td><td>nz &gt; 0.9 and x &lt; 1/2</td><td>0;0;-2</td><td>0.5</td>" in text
-    assert "<h2>What holds the body</h2>" in text and '<th scope="col">z [MPa·mm²]</th>' in text
+    assert "<h2>What holds the body</h2>" in text and '<th scope="col">z [N]</th>' in text
     assert "<td>Fix &#39;z &lt; 1e-6&#39;</td><td>0</td><td>0</td><td>1</td>" in text
     assert Path("out/regions.png").is_file() == render.can_draw() == ('alt="Where data are given"' in text)
 

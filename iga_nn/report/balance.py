@@ -8,6 +8,7 @@ from typing import Any
 from ..level_table import capitalized
 
 AXES = ("x", "y", "z")
+NEWTON = {("MPa", "mm"), ("N/mm²", "mm"), ("N/mm^2", "mm"), ("Pa", "m"), ("N/m²", "m"), ("N/m^2", "m")}
 TINY = 1e-6  # of the largest number: the linear solver's own error is smaller
 
 
@@ -55,6 +56,8 @@ def _is_force(section: dict[str, Any]) -> bool:
 def _behind(section: dict[str, Any]) -> str:
     """Return the unit of forces, where the units of stresses and of lengths are known."""
     stress, length = section.get("stress_unit"), section.get("unit")
+    if (stress, length) in NEWTON:
+        return "N"
     return f"{stress}·{length}²" if stress and length else ""
 
 

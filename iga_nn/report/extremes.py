@@ -19,7 +19,8 @@ SAYINGS = {  # quantity -> its words, the extreme that they name, and the sectio
     "gradient_magnitude": ("|gradient| at most", "largest", ""),
     "flux_magnitude": ("|flux| at most", "largest", ""),
 }
-DERIVATIVES = {"von_mises": "von Mises stress", "flux_magnitude": "|flux|", "gradient_magnitude": "|gradient|"}
+STRESS = "von_mises"
+DERIVATIVES = {STRESS: "von Mises stress", "flux_magnitude": "|flux|", "gradient_magnitude": "|gradient|"}
 GROWTH = 1.1  # of the largest stress while h is halved; smooth ones, resolved, grow less, at clamped rims 1.2 and more
 TINY = 1e-6  # of the largest coordinate: smaller ones are shown as 0
 
@@ -52,9 +53,12 @@ def finest(section: dict[str, Any]) -> dict[str, tuple[float, str]]:
 
 
 def growth_notices(section: dict[str, Any]) -> list[str]:
-    """Return a notice where the largest stress, or gradient, grew by more than GROWTH for each time h was halved."""
+    """Return a notice where the largest stress, or gradient, grew by more than GROWTH for each time h was halved.
+
+    One level of a stress has a notice that nothing is known of its growth.
+    """
     if len(known := _known(section)) < 2:
-        return []
+        return _of_one_level(known, section)
     coarse, fine = known[-2:]
     for name, title in DERIVATIVES.items():
         if name not in coarse["extremes"] or name not in fine["extremes"]:
@@ -69,6 +73,17 @@ def growth_notices(section: dict[str, Any]) -> list[str]:
                 "tells"
             ]
     return []
+
+
+def _of_one_level(known: Sequence[Level], section: dict[str, Any]) -> list[str]:
+    """Return the notice on the largest stress where it is known on one level alone, or not at all."""
+    if not known or STRESS not in known[-1]["extremes"]:
+        return []
+    where = _place(known[-1]["extremes"][STRESS]["largest_at"], section)
+    return [
+        f"the largest {DERIVATIVES[STRESS]}, at {where}, is known on one level alone: at a clamped rim or a re-entrant "
+        "edge it is infinite, and the number is no result; --refine 0 1 tells whether it grows"
+    ]
 
 
 def _place(point: Sequence[float], section: dict[str, Any]) -> str:
