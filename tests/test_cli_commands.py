@@ -72,7 +72,7 @@ def test_run_poisson_writes_the_whole_folder(formula_training, in_folder, capsys
     assert set(report["versions"]) == {"python", "numpy", "scipy", "torch", "iga-nn"}
     out, err = capsys.readouterr()
     assert "certified" in out and "deep/result" in out
-    assert "S(2)" in err and "0 folds, 0:01 left, then the spline fit" in err
+    assert "S(2)" in err and "0 folds, 0:01 of the training left" in err
 
 
 def test_json_is_the_verdict_alone(formula_training, in_folder, capsys):

@@ -138,12 +138,20 @@ def test_one_more_level_can_be_asked_for_on_the_way(formula_training, ending, in
     assert main(["run", "poisson", "cube", "--refine", "0", "1", "2", "--resume"]) == 0 and begun == [1, 2]
 
 
-def test_an_interruption_of_the_first_level_leaves_a_page_of_the_map(formula_training, ending, in_folder):
-    formula_training()
+def test_an_interruption_of_the_first_level_leaves_the_map_and_its_page(
+    ending, in_folder, few_distances, capsys, monkeypatch
+):
+    body_of_planes("L.obj")
+    run = ["run", "poisson", "L.obj", "--control-points", "6", "--refine", "0"]
     ending(KeyboardInterrupt(), at=0)
-    assert main(["run", "poisson", "cube", "--refine", "0"]) == 130
-    assert report_of("cube")["not_solved"] == "interrupted" and "poisson" not in report_of("cube")
-    assert "The problem was not solved" in Path("cube/report.html").read_text()
+    assert main(run) == 130
+    assert "--resume continues from the map, and does again what came after" in capsys.readouterr().err
+    assert report_of("L")["not_solved"] == "interrupted" and "poisson" not in report_of("L")
+    assert "The problem was not solved" in Path("L/report.html").read_text()
+    monkeypatch.setattr("parameterize.run.parameterize", lambda *_, **__: pytest.fail("the map is there"))
+    begun = ending()
+    assert main([*run, "--resume"]) == 0 and begun == [0] and "not_solved" not in report_of("L")
+    assert "L: the map is there, and kept" in capsys.readouterr().err
 
 
 def test_a_solve_keeps_its_levels_and_is_not_replaced_unasked(ending, in_folder, capsys):
@@ -215,8 +223,8 @@ def test_a_real_signal_in_a_level(name, code, in_folder, few_distances, ending):
     assert done.returncode == code, done.stderr
     assert len(report_of("out")["poisson"]["levels"]) == 2
     if name != "SIGKILL":
-        last = "interrupted; the same command with --resume continues from the levels that are solved"
-        assert done.stderr.splitlines()[-1] == f"iga-nn: {last}"
+        way = "the same command with --resume continues from the levels that are solved, and does again what came after"
+        assert done.stderr.splitlines()[-1] == f"iga-nn: interrupted; {way}"
         assert "refine 2 is missing" in Path("out/report.html").read_text() and Path("out/solution.vtu").is_file()
     begun = ending()
     assert main([*run, "--resume"]) == 0 and begun == [2]

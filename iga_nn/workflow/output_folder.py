@@ -251,9 +251,11 @@ def has_checkpoint(folder: Path) -> bool:
 
 def _way_on(folder: Path) -> str:
     """Return in words what is done, and how to continue after an interruption."""
-    if has_checkpoint(folder):
-        return f"the same command with --resume continues from {_last_kept(folder)}"
     report = reports.read(folder) or {}
+    if has_checkpoint(folder):
+        is_mapped = "parameterization" in report and not reports.solved(report)
+        last = "the map" if is_mapped else _last_kept(folder)
+        return f"the same command with --resume continues from {last}, and does again what came after"
     if levels := reports.solved(report).get("levels"):
         return f"{len(levels)} level{'s' * (len(levels) > 1)} done, in {folder / REPORT}"
     if (folder / "volume.npz").exists():
