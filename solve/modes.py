@@ -1,34 +1,36 @@
 """Computes modes by LOBPCG: the lowest vibrations of a body, or eigenfunctions of any symmetric law."""
 
+import logging
 import math
-import warnings
 from dataclasses import dataclass
 from numbers import Integral, Real
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.sparse.linalg import LinearOperator, lobpcg
 
 from parameterize.arrays import Array
-from parameterize.conjugate_gradients import conjugate_gradients
 from parameterize.display import Brief
 from parameterize.files import save_arrays
-from parameterize.spline.multipatch import MultiPatch, as_multipatch, size_of
+from parameterize.spline.multipatch import MultiPatch
 from parameterize.spline.volume import BSplineVolume
+from parameterize.threads import one_blas_thread
 
 from .diagnostics import ConvergenceError
 from .field import MultiPatchField, arrays_of
 from .forms.boundary_value_problem import BoundaryValueProblem
+from .linear.direct import factorized, price_of, sparse
+from .linear.inverse import RoughInverse
+from .lowest import Lowest, Pencil, Product, by_columns, of_unit_mass
 from .options import SolveOptions
+from .rigid import rigid_motions
 from .solver import discretized
 from .system import System
 
-SPARE = 4  # vectors more than are wanted, and half as many as these again: the last ones converge slowly
-ROUND = 8  # iterations before the first look at the residuals; each round is as long as all before
-AT_REST = 1e-7  # share of the shift below which an eigenvalue is that of a rigid motion
-INNER, INNER_MOST = 0.1, 500  # tolerance and iterations of the solves that precondition: K of a slender body is hard
-RIGID = {1: 1, 3: 6}  # motions of a free part of a body that take no energy, by the law's components
+DOUBTFUL = 1e-3  # share of an eigenvalue from which on an error of it is told
+FACTORED = 15_000  # most unknowns of a matrix that is factorized: of a cube the factor takes 0.7 GB
+
+log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -42,11 +44,15 @@ class Modes(Brief):
     shapes : tuple of n SplineField, of several patches MultiPatchField
         phi with unit mass: the integral of density phi . phi is 1. The largest coefficient is positive.
     residuals : (n,) array
-        Residuals `|K phi - omega^2 M phi| / |K phi|` of the free coefficients.
+        Residuals `|K phi - omega^2 M phi| / |K phi|` of the free coefficients, in the norm of K^-1 where the system
+        was factorized, as those of up to 15 000 unknowns are where conjugate gradients take long.
     iterations : int
         Number of iterations of LOBPCG.
     rigid : int
-        Number of motions of a free body that need no energy; their frequency is zero, and they are left out.
+        Number of motions that take no energy; their frequency is zero, and they are left out. It is known before the
+        modes are sought: six for each part of an elastic body that nothing holds, fewer with supports.
+    notices : tuple of str
+        Why the frequencies are doubtful, where they are.
 
     Examples
     --------
@@ -63,6 +69,7 @@ class Modes(Brief):
     residuals: Array
     iterations: int
     rigid: int = 0
+    notices: tuple[str, ...] = ()
 
     def as_dict(self) -> dict[str, Any]:
         """Return the numbers of the modes for report.json."""
@@ -71,6 +78,7 @@ class Modes(Brief):
             "residuals": self.residuals,
             "iterations": self.iterations,
             "rigid": self.rigid,
+            "notices": list(self.notices),
         }
 
     def save(self, path: str | Path) -> None:
@@ -109,8 +117,8 @@ def modes(
 ) -> Modes:
     """Return the lowest modes of a body: K phi = omega^2 M phi, K the stiffness of a law and M the mass.
 
-    Faces on which the law gives u are held, at rest whatever the value, the others are free; loads do not matter. Where
-    nothing holds the body, K gets a multiple of M while the modes are sought, and its rigid motions are left out.
+    Faces on which the law gives u are held, at rest whatever the value, the others are free; loads do not matter. The
+    rigid motions that no support holds are known, and left out: the modes are sought among all other motions.
 
     Parameters
     ----------
@@ -125,8 +133,8 @@ def modes(
     refine, degree, threads, quadrature
         As in `iga_nn.solve`.
     tolerance : float
-        Tolerance of the residuals `|K phi - omega^2 M phi| / |K phi|`; its square is about the relative error of a
-        frequency.
+        Tolerance of the residuals `|K phi - omega^2 M phi| / |K phi|`, of a factorized system in the norm of K^-1; its
+        square is about the relative error of a frequency.
     max_iterations : int
         Largest number of iterations of LOBPCG.
 
@@ -137,9 +145,9 @@ def modes(
     Raises
     ------
     ValueError
-        For arguments out of range and a law that is not symmetric.
+        For arguments out of range, and a law that is not symmetric or not positive.
     ConvergenceError
-        Where a residual stays above the tolerance.
+        Where a residual stays above the tolerance, after `max_iterations` or as soon as residuals fall no more.
 
     Examples
     --------
@@ -155,25 +163,28 @@ def modes(
         raise ValueError(f"{type(law.form).__name__} is not linear: it has modes about a state only, and no others")
     if not law.form.symmetric:
         raise ValueError(f"{type(law.form).__name__} is not symmetric: its modes need not be real, and are not sought")
-    shift = _stiffness(body, law) if is_free(law) else 0.0
     options = SolveOptions(refine=refine, degree=degree, threads=threads, quadrature=quadrature)
-    system = discretized(body, law, options, shift)
-    system = system.at_rest()
-    of_part = RIGID.get(len(system.right), len(system.right))
-    rigid = of_part * len(as_multipatch(body).parts) if shift else 0
+    system = discretized(body, law, options, is_loose=True).at_rest()
+    mass = by_columns(system.mass.matvec)
+    motions = rigid_motions(system)
+    rigid = motions.shape[1]
     if n + rigid > len(system.load):
         raise ValueError(f"n {n}: the space has {len(system.load)} unknowns, fewer modes; raise refine or lower n")
-    values, vectors, residuals, iterations = _lowest(system, n + rigid, tolerance, max_iterations)
-    if residuals.max() > tolerance:
+    pencil = Pencil(by_columns(system.operator.matvec), mass, _inverse(system), of_unit_mass(motions, mass))
+    with one_blas_thread():
+        found = pencil.lowest(n, tolerance, max_iterations)
+    notices = _notices(found)
+    if found.worst > tolerance:
+        remedy = "raise max_iterations or the tolerance, or ask for some more modes where several lie close together"
         raise ConvergenceError(
-            f"modes: residual {residuals.max():.1e} after {iterations} iterations, tolerance {tolerance:.0e}: raise "
-            "max_iterations or the tolerance, or ask for some more modes where several lie close together"
+            f"modes: residual {found.worst:.1e} after {found.iterations} iterations, tolerance {tolerance:.0e}: "
+            f"{'; '.join(notices) or remedy}"
         )
-    rigid = int(np.count_nonzero(values - shift < AT_REST * shift))
-    chosen = slice(rigid, rigid + n)
-    omega = np.sqrt(np.maximum(values[chosen] - shift, 0.0) / density)
-    shapes = tuple(system.field(_upright(x) / math.sqrt(density)) for x in vectors[:, chosen].T)
-    return Modes(omega / (2.0 * math.pi), shapes, residuals[chosen], iterations, rigid)
+    for notice in notices:
+        log.warning("%s", notice)
+    omega = np.sqrt(found.values / density)
+    shapes = tuple(system.field(_upright(x) / math.sqrt(density)) for x in found.vectors.T)
+    return Modes(omega / (2.0 * math.pi), shapes, found.residuals, found.iterations, rigid, notices)
 
 
 def check_modes(density: float, n: int, tolerance: float = 0.5, max_iterations: int = 1) -> None:
@@ -187,52 +198,31 @@ def check_modes(density: float, n: int, tolerance: float = 0.5, max_iterations: 
         raise ValueError(f"tolerance must be a number between 0 and 1, got {tolerance!r:.80}")
 
 
-def is_free(law: BoundaryValueProblem) -> bool:
-    """Return whether nothing may hold a body; regions count as nothing, because they can leave motions free."""
-    on_faces = not law.dirichlet and (bool(law.conditions) or len(law.natural) == 6)
-    return on_faces and not law.form.has_reaction
+def _notices(found: Lowest) -> tuple[str, ...]:
+    """Return what makes the modes doubtful: rounding, and a space that does not contain the rigid motions."""
+    notices = []
+    if (share := found.rounding.max(initial=0.0)) > DOUBTFUL:
+        notices.append(
+            f"rounding changes the square of frequency {found.rounding.argmax() + 1} by {share:.1g} of its value: the "
+            "body is too slender, or its supports too soft, for double precision"
+        )
+    if (share := found.leak / found.values.min(initial=np.inf)) > DOUBTFUL:
+        notices.append(
+            f"the trial space contains the rigid motions only nearly, they have {share:.1g} of the energy of the first "
+            "mode: refine until the frequencies stay, or take at least the degree of the map"
+        )
+    return tuple(notices)
 
 
-def _stiffness(body: BSplineVolume | MultiPatch, law: BoundaryValueProblem) -> float:
-    """Return the law's factor in the middle of a patch over the squared length, which estimates the eigenvalues."""
-    glued, placed = as_multipatch(body), law.on(body)
-    own = placed.on_patch(0, glued.outer[0]) if isinstance(body, MultiPatch) else placed
-    x = glued.patches[0].grid([0.5], [0.5], [0.5]).reshape(3, 1)
-    length = size_of(glued)
-    return float(own.form.tensor(x)[0, 0] / length**2)
+def _inverse(system: System) -> RoughInverse:
+    """Return an approximate inverse of the stiffness."""
+    matrices = [patch.matrix for patch in system.patches]
+    price = price_of(system.unknowns, matrices, len(system.right)) if len(system.load) <= FACTORED else math.inf
 
+    def factorize() -> Product | None:
+        return factorized(sparse(system.unknowns, matrices, len(system.right)))
 
-def _lowest(system: System, n: int, tolerance: float, most: int) -> tuple[Array, Array, Array, int]:
-    """Return n eigenvalues, vectors (N, n) of unit mass, relative residuals, and the number of iterations.
-
-    LOBPCG (Knyazev, SIAM J. Sci. Comput. 23 (2001)) iterates on more vectors than n, and starts again from these
-    vectors where the residuals are too large: SciPy's own tolerance is that of |K x - s M x|, which has units. The
-    preconditioner is a rough solve with K, so that a slender body needs no more iterations than other bodies.
-    """
-    a, mass, size = system.operator, system.mass, len(system.load)
-
-    def rough(r: Array) -> Array:
-        found = conjugate_gradients(a.matvec, r.ravel(), system.preconditioner.matvec, INNER, INNER_MOST)
-        return np.asarray(found.x)
-
-    inverse = LinearOperator(a.shape, matvec=rough, dtype=np.float64)
-    block = min(n + n // 2 + SPARE, size)
-    vectors, made, limit = np.random.default_rng(0).standard_normal((size, block)), 0, 0.0
-    while True:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # of residuals, which are judged here
-            steps = min(max(ROUND, made), most - made)
-            found = lobpcg(
-                a, vectors, mass, inverse, tol=limit, maxiter=steps, largest=False, retResidualNormsHistory=True
-            )
-        values, vectors = np.asarray(found[0]), np.asarray(found[1])
-        made += min(steps, len(found[2]) - 1) if len(found) == 3 else 1  # of few unknowns SciPy solves the whole
-        forces = a @ vectors[:, :n]
-        sizes = np.linalg.norm(forces, axis=0)
-        residuals = np.linalg.norm(forces - values[:n] * (mass @ vectors[:, :n]), axis=0) / sizes
-        if residuals.max() <= tolerance or made >= most:
-            return values[:n], vectors[:, :n], residuals, made
-        limit = 0.3 * tolerance * float(sizes.min())
+    return RoughInverse(system.operator.matvec, system.preconditioner.matvec, factorize, price)
 
 
 def _upright(x: Array) -> Array:

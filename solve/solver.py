@@ -150,13 +150,13 @@ def discretize(
 
 
 def discretized(
-    body: BSplineVolume | MultiPatch, problem: BoundaryValueProblem, options: SolveOptions, shift: float = 0.0
+    body: BSplineVolume | MultiPatch, problem: BoundaryValueProblem, options: SolveOptions, is_loose: bool = False
 ) -> System:
-    """Return the system of `discretize` with `shift` times the mass in its matrix; a shifted body needs no supports."""
+    """Return the system of `discretize`; that of a loose body, for its modes, needs no supports."""
     placed, patches = prepared(body, problem, options)
-    if shift == 0.0:
+    if not is_loose:
         problem.demand_held()
-    return build(body, placed, patches, options, shift)
+    return build(body, placed, patches, options, is_loose=is_loose)
 
 
 def prepared(

@@ -327,35 +327,40 @@ def build(
     patches: Sequence[PatchProblem],
     options: SolveOptions,
     shift: float = 0.0,
+    is_loose: bool = False,
 ) -> System:
     """Return the system of a problem on a body, whose data are placed in it (`problem.on`).
 
     patches: the problem on each patch. shift: the factor of the mass matrix in A, which is added to the law's matrix.
+    is_loose: whether motions that nothing holds are no fault; a body with a shift is loose.
     """
+    is_loose = is_loose or shift != 0.0
     start, glued = time.process_time(), as_multipatch(body)
     with one_blas_thread():
         systems = tuple(PatchSystem.of(patch, options, shift) for patch in patches)
-        _demand_held(glued, problem, systems, shift)
+        _demand_held(glued, problem, systems, is_loose)
         unknowns = unknowns_of([patch.space for patch in systems], glued.interfaces)
         known = unknowns.completed([system.known for system in systems])
         systems = tuple(replace(system, known=own) for system, own in zip(systems, known, strict=True))
         blocks = _preconditioners(unknowns, systems, glued.interfaces)
-        if blocks[0].singular and isinstance(systems[0].matrix, FormOperator):
+        if blocks[0].singular and not is_loose and isinstance(systems[0].matrix, FormOperator):
             raise ValueError(
                 f"{type(problem.form).__name__} without a reaction, and with Neumann data on all faces, does not "
                 "determine the solution: give a value, or an exchange, on a face or a region"
             )
         right = unknowns.collect([system.right for system in systems])
-        right = balanced(right, unknowns, systems[0].space) if blocks[0].singular else right
+        right = balanced(right, unknowns, systems[0].space) if blocks[0].singular and not is_loose else right
         setup = time.process_time() - start
     return System(body, problem, systems, unknowns, blocks, right, setup)
 
 
-def _demand_held(body: MultiPatch, problem: BoundaryValueProblem, systems: Sequence[PatchSystem], shift: float) -> None:
-    """Raise ValueError where a region has no area, and where a part of a body without a shift is free to move."""
+def _demand_held(
+    body: MultiPatch, problem: BoundaryValueProblem, systems: Sequence[PatchSystem], is_loose: bool
+) -> None:
+    """Raise ValueError where a region has no area, and where a part of a body that is not loose is free to move."""
     space, volumes = systems[0].space, [system.volume for system in systems]
     demand_area(problem, [face for system in systems for face in system.weak], space, volumes)
-    if shift != 0.0:
+    if is_loose:
         return
     parts = body.parts
     for numbers in parts:

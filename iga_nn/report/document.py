@@ -213,6 +213,7 @@ def verdict(report: Report, folder: Path) -> Report:
         short["levels"] = [{key: level[key] for key in keys if key in level} for level in section["levels"]]
         short["notices"] = section["notices"]
     if vibration := report.get("modes"):
-        short["modes"] = {name: vibration[name] for name in ("frequencies", "rigid", "residuals")}
+        shown = ("frequencies", "rigid", "residuals", "notices")
+        short["modes"] = {name: vibration[name] for name in shown if name in vibration}
     short["seconds"] = report["seconds"]["total"]
     return short

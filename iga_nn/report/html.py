@@ -6,6 +6,7 @@ The template page.html lays out the page and escapes its content; this module ch
 import base64
 import logging
 from html import escape
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -203,7 +204,10 @@ def notices(report: Report) -> list[str]:
     for name, reason in report.get("not_drawn", {}).items():
         missing.setdefault(reason, []).append(name)
     undrawn = [f"{', '.join(names)} could not be drawn: {reason}" for reason, names in missing.items()]
-    return [*report["input"].get("notices", []), *reports.solved(report).get("notices", []), *undrawn]
+    found = (
+        section.get("notices", []) for section in (report["input"], reports.solved(report), report.get("modes", {}))
+    )
+    return [*chain.from_iterable(found), *undrawn]
 
 
 def figures(report: Report, folder: Path) -> list[tuple[str, str]]:

@@ -1,0 +1,79 @@
+"""Factorizes the matrix of a system: entries from products with few vectors, and a sparse factor."""
+
+from collections.abc import Callable, Sequence
+from itertools import product
+
+import numpy as np
+from scipy.sparse import coo_array, csc_array, diags_array
+from scipy.sparse.linalg import splu
+
+from parameterize.arrays import Array, IntArray
+
+from ..discretization.operator import MatrixFree
+from ..discretization.unknowns import Unknowns
+
+# Shares of its diagonal that are added to a matrix, tried in turn: rounding may make a positive matrix indefinite. The
+# first one is least: of a foil, 1 : 20 000, it is 1000 times the lowest eigenvalue.
+SHARES = tuple(10.0**k for k in range(-15, -7))
+PER_UNKNOWN = 7  # unknowns whose part of a factor takes the time of one iteration, on a cube of 6 591 unknowns
+
+
+def sparse(unknowns: Unknowns, matrices: Sequence[MatrixFree], components: int) -> csc_array:
+    """Return the matrix (N, N) of a body from those of its patches, for N = components times the unknowns of each.
+
+    Functions of which no third function sees two are multiplied in one product, so that a patch of degree p takes
+    (2 p + 1)^3 products a component, however fine it is.
+    """
+    count = int(np.prod(unknowns.shape))
+    numbers = np.arange(1.0, count + 1.0).reshape(1, *unknowns.shape)  # spread as coefficients: zero where fixed
+    rows, columns, values = [], [], []
+    for matrix, spread in zip(matrices, unknowns.spread(numbers), strict=True):
+        places = spread[0].astype(np.int64).ravel() - 1
+        for colour in product(*(range(2 * degree + 1) for degree in matrix.space.degrees)):
+            sees, seen = _pairs(matrix, colour)
+            here = tuple(slice(a, None, 2 * p + 1) for a, p in zip(colour, matrix.space.degrees, strict=True))
+            free = (places[sees] >= 0) & (places[seen] >= 0)
+            sees, seen = sees[free], places[seen[free]]
+            for component in range(components):
+                unit = np.zeros((components, *matrix.space.shape))
+                unit[component][here] = 1.0
+                found = matrix.apply(unit).reshape(components, -1)[:, sees]
+                rows.append((np.arange(components)[:, None] * count + places[sees]).ravel())
+                columns.append(np.tile(component * count + seen, components))
+                values.append(found.ravel())
+    entries = np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))
+    return coo_array(entries, shape=(components * count,) * 2).tocsc()
+
+
+def _pairs(matrix: MatrixFree, colour: Sequence[int]) -> tuple[IntArray, IntArray]:
+    """Return the numbers of the functions that see one of a colour, and of the one that each sees."""
+    sees, seen = [], []
+    for first, degree, n in zip(colour, matrix.space.degrees, matrix.space.shape, strict=True):
+        lowest = np.arange(n) - degree
+        own = lowest + (first - lowest) % (2 * degree + 1)
+        sees.append(np.flatnonzero((own >= 0) & (own < n)))
+        seen.append(own[sees[-1]])
+    one, other = (np.ravel_multi_index(np.ix_(*each), matrix.space.shape).ravel() for each in (sees, seen))
+    return one, other
+
+
+def price_of(unknowns: Unknowns, matrices: Sequence[MatrixFree], components: int) -> float:
+    """Return how many iterations of conjugate gradients take the time of a factor; one takes that of two products."""
+    made = components * max(int(np.prod([2 * p + 1 for p in matrix.space.degrees])) for matrix in matrices)
+    return made / 2 + components * int(np.prod(unknowns.shape)) / PER_UNKNOWN
+
+
+def factorized(matrix: csc_array) -> Callable[[Array], Array] | None:
+    """Return the function that solves with a symmetric positive matrix (N, N) for columns (N, m).
+
+    None is returned for a matrix that is not positive even with the largest of SHARES.
+    """
+    for share in SHARES:
+        shifted = (matrix + diags_array(share * matrix.diagonal())).tocsc()
+        try:
+            factor = splu(shifted, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
+        except RuntimeError:  # it is singular
+            continue
+        if factor.U.diagonal().min() > 0.0:
+            return lambda right: np.asarray(factor.solve(np.ascontiguousarray(right)), dtype=np.float64)
+    return None
