@@ -3,7 +3,7 @@
 import hashlib
 import logging
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -29,6 +29,7 @@ from .mending import Asked, mend, without_defects
 from .part import PartSurface
 from .readers.file import RawMesh, read_mesh
 from .readers.objects import READERS, class_of, read_object
+from .solids import distinct_solids, one_solid
 
 if TYPE_CHECKING:
     import meshio
@@ -255,7 +256,10 @@ def bodies_in(path: Path, max_faces: int = MAX_FACES) -> list[int | None]:
 
     One inside another is none. None alone stands for the only component. Raises MeshError for a file that is refused.
     """
-    return outer_bodies(without_defects(read_mesh(path, max_faces), max_faces)[0])
+    raw = read_mesh(path, max_faces)
+    if (count := len(distinct_solids(raw))) > 1:
+        return list(range(count))
+    return outer_bodies(without_defects(one_solid(raw, None)[0], max_faces)[0])
 
 
 def surface_from_arrays(
@@ -332,7 +336,8 @@ def _array(values: ArrayLike, name: str) -> NDArray[Any]:
 
 def _gate(raw: RawMesh, name: str, source: str, asked: Asked) -> Surface:
     """Make a surface: mend it, check its topology, place it."""
-    draft, mended = mend(raw, asked)
+    raw, component = one_solid(raw, asked.component)
+    draft, mended = mend(raw, replace(asked, component=component))
     points, triangles = draft.points, draft.faces
     doubts = topology.slivers(points, triangles, draft.where)
     crossings = topology.crossing_faces(points, triangles)

@@ -58,6 +58,7 @@ from mesh_files import (
 )
 from reader_files import Ply, beside, faces, grid, msh2, msh2_binary, msh41, msh41_binary, save, vertices
 from scene_files import glb, gltf, model, solid_model, threemf, zipped
+from step_files import crowded
 from vtkmodules.vtkIOLegacy import vtkUnstructuredGridWriter
 
 from iga_nn.errors import InputError, input_errors, one_line
@@ -436,7 +437,8 @@ def scene_readers():
     yield Reader("zip, bytes", ".zip", check, ([zipped({"cube.stl": binary_stl(), "b.txt": "b"})],))
     for suffix in (".step", ".iges"):
         if found := solid_model(suffix[1:]):
-            yield Reader(suffix[1:], suffix, check, ([found],), share=0.1)
+            pieces = ([found], [crowded()]) if suffix == ".step" else ([found],)
+            yield Reader(suffix[1:], suffix, check, pieces, share=0.1)
 
 
 def npz_reader(name, read, *things):

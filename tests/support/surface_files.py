@@ -6,6 +6,7 @@ import struct
 import numpy as np
 import threemf_files
 from gltf_files import BOX, Gltf
+from iges_files import parameters, section
 from mesh_files import (
     CUBE,
     MIXED,
@@ -20,6 +21,7 @@ from mesh_files import (
     text_stl,
 )
 from scene_files import glb, gltf, model, threemf, zipped
+from step_files import Step, converted
 
 ACCEPTED = {
     "quads.obj": (obj(), "6 polygons cut into 12 triangles"),
@@ -106,6 +108,9 @@ REFUSED = {
     "garbage.vtu": ("hello\n", "VTKFile"),
     "unknown.sldprt": ("part", "unknown format"),
     "garbage.step": ("hello\n", "not a STEP file"),
+    "feet_of_inches.step": (Step(*converted("FOOT", 12, converted("INCH", 25.4))).data(), "no SI unit"),
+    "garbage.iges": ("hello\n", "not an IGES file"),
+    "flag.iges": (section(parameters("12")), "the flag '12' of its unit is none of IGES"),
     "garbage.vtk": ("hello\n", "not a .vtk"),
     "image.vtk": ("# vtk DataFile Version 3.0\nimage\nASCII\nDATASET STRUCTURED_POINTS\n", "holds 'STRUCTURED_POINTS'"),
     "many.vtk": (

@@ -1,59 +1,105 @@
 """STEP and IGES by OpenCASCADE, in the package cadquery-ocp-novtk: faces of the B-rep become groups face1, face2, ...
 
 It runs in a process of its own (`opencascade.py`): on a damaged file the library may end it, and it prints as it likes.
-It works in millimetres; lengths are brought back to the unit of the file.
+It works in millimetres, or in the file's unit where that is smaller; lengths are brought back to the file's unit.
 """
 
-import re
+import json
 import subprocess
 import sys
 import tempfile
+from collections import Counter
+from collections.abc import Mapping
 from importlib.util import find_spec
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from ..errors import MeshError, check_face_count
 from ..groups import gathered
+from .cad_units import Unit, iges_unit, step_unit
 from .common import DAMAGED, Content
+from .step_items import beside
 
 INSTALL = "pip install 'iga-nn[cad]'"
 PROGRAM = Path(__file__).with_name("opencascade.py")
 PATIENCE = 300.0  # seconds
 ANGLE = 0.2  # radians between neighbouring triangles of a curved face: some 31 around a full turn
 SHARE = 1e-3  # of the box's diagonal: the deflection where none is given
-UNITS = {"MICRO": ("micron", 1e-3), "MILLI": ("mm", 1.0), "CENTI": ("cm", 10.0), "DECI": ("dm", 100.0)}
-UNITS |= {"": ("m", 1000.0), "INCH": ("in", 25.4), "FOOT": ("ft", 304.8)}  # name, millimetres
-METRIC = re.compile(rb"SI_UNIT\s*\(\s*(?:\.(\w+)\.|\$)\s*,\s*\.METRE\.\s*\)")
-CONVERTED = re.compile(rb"CONVERSION_BASED_UNIT\s*\(\s*'(INCH|FOOT)", re.IGNORECASE)
-
-IGES_UNIT = re.compile(rb",\s*\d{1,2}\s*,\s*\d+H(INCH|IN|FT|MM|CM|M)\s*,")  # parameters 14 and 15 of the section G
-IGES_NAMES = {b"INCH": "INCH", b"IN": "INCH", b"FT": "FOOT", b"MM": "MILLI", b"CM": "CENTI", b"M": ""}
+LISTED = 8  # names in a message
+SMALLEST = 1e-4  # of OpenCASCADE's unit: a thousand of its tolerances
+MESH = "the solid is a mesh in the file, not a B-rep: its triangles are taken, and deflection does not change them"
+SAID = {
+    "healed": "OpenCASCADE found a fault in the solid and healed it",
+    "invalid": "OpenCASCADE finds a fault in the solid and cannot heal it: compare its volume",
+}
+PLURALS = {"other entity": "other entities", "surface without an outline": "surfaces without an outline"}
 
 
 def read_step(data: bytes, max_faces: int, deflection: float | None = None) -> Content:
-    """Read a .step. deflection: largest distance of the triangles from curved faces, in the file's unit."""
+    """Read the solids of a .step, or its faces where it has none. Lengths are in the file's unit.
+
+    deflection: largest distance of the triangles from curved faces, in that unit.
+    """
     if b"ISO-10303-21" not in data[:4096]:
         raise MeshError(f"not a STEP file: it does not begin with ISO-10303-21; {DAMAGED}")
-    found = METRIC.search(data)
-    named = (found[1] or b"").decode() if found else "MILLI"
-    if other := CONVERTED.search(data):
-        named = other[1].decode().upper()
-    if named not in UNITS:
-        raise MeshError(f"the unit of lengths {named[:20].lower()}metre is not known: export it in millimetres")
-    return _read(data, "step", max_faces, deflection, *UNITS[named])
+    return _read(data, "step", step_unit(data), max_faces, deflection)
 
 
 def read_iges(data: bytes, max_faces: int, deflection: float | None = None) -> Content:
-    """Read a .iges as `read_step` reads a .step; in millimetres where it names no unit."""
-    lines = data.replace(b"\r", b"").split(b"\n")
-    found = IGES_UNIT.search(b"".join(line[:72] for line in lines if line[72:73] == b"G"))
-    named = IGES_NAMES[found[1]] if found else "MILLI"
-    return _read(data, "iges", max_faces, deflection, *UNITS[named])
+    """Read a .iges as `read_step` reads a .step."""
+    return _read(data, "iges", iges_unit(data), max_faces, deflection)
 
 
-def _read(data: bytes, kind: str, max_faces: int, deflection: float | None, unit: str, millimetres: float) -> Content:
-    """Return the triangles of a file, in the unit that has so many millimetres."""
+def _read(data: bytes, kind: str, unit: Unit, max_faces: int, deflection: float | None) -> Content:
+    """Return the bodies of a file in its unit. Raises MeshError where there are none."""
+    arrays, facts = _run(data, kind, deflection, unit)
+    left_out = Counter(facts["left_out"]) + (beside(data) if kind == "step" else Counter())
+    _check(facts, len(arrays["faces"]), left_out)
+    check_face_count(len(arrays["faces"]), max_faces)
+    faces, owners = arrays["labels"].T
+    groups = gathered((f"face{value}", np.flatnonzero(faces == value)) for value in np.unique(faces).tolist())
+    names = facts["names"]
+    solids = tuple((name, np.flatnonzero(owners == k)) for k, name in enumerate(names, 1)) if len(names) > 1 else ()
+    notices = (*unit.notices, *_notices(facts, left_out))
+    return Content(
+        arrays["vertices"] / unit.factor, arrays["faces"].tolist(), notices, groups, unit=unit.name, solids=solids
+    )
+
+
+def _check(facts: Mapping[str, Any], count: int, left_out: Counter[str]) -> None:
+    """Raise MeshError for a file without bodies, or with what OpenCASCADE does not read rightly."""
+    if facts["changed"]:
+        raise MeshError("places a shape by a mirror or a scale, which OpenCASCADE does not apply: export it in place")
+    if missing := facts["missing"]:
+        named = ", ".join(f"face{number}" for number in missing[:LISTED]) + ", ..." * (len(missing) > LISTED)
+        raise MeshError(f"OpenCASCADE cannot divide {named} into triangles: repair it, or export triangles instead")
+    if not count:
+        there = f", only {_counted(left_out)}" if left_out else ""
+        raise MeshError(f"has no solid and no faces that bound a body{there}: export the solid")
+    if facts["size"] < SMALLEST:
+        raise MeshError(
+            f"is {facts['size']:.1g} units of its file large, too small for OpenCASCADE: choose a smaller unit"
+        )
+
+
+def _notices(facts: Mapping[str, Any], left_out: Counter[str]) -> list[str]:
+    """Return what was left out, and what is to be known of the solids."""
+    what = "solid" if facts["what"] == "solid" else "body"
+    notices = [f"left out beside the {what}: {_counted(left_out)}"] if left_out else []
+    notices += [MESH] if facts["what"] == "mesh" else []
+    return notices + [SAID[state] for state in SAID if facts["states"].get(state)]
+
+
+def _counted(things: Counter[str]) -> str:
+    """Return numbers of things in words, such as "3 loose faces, 1 curve"."""
+    pairs = ((number, name if number == 1 else PLURALS.get(name, f"{name}s")) for name, number in things.items())
+    return ", ".join(f"{number} {name}" for number, name in pairs)
+
+
+def _run(data: bytes, kind: str, deflection: float | None, unit: Unit) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Return the arrays and the facts that OpenCASCADE finds in a file. Raises MeshError where it fails."""
     if deflection is not None and not 0.0 < deflection < np.inf:
         raise MeshError(f"deflection must be a positive length, got {deflection!r:.40}")
     if find_spec("OCP") is None:
@@ -61,8 +107,8 @@ def _read(data: bytes, kind: str, max_faces: int, deflection: float | None, unit
     with tempfile.TemporaryDirectory() as folder:
         source, target = Path(folder, "source"), Path(folder, "target.npz")
         source.write_bytes(data)
-        wanted = repr(0.0 if deflection is None else deflection * millimetres)
-        command = [sys.executable, str(PROGRAM), str(source), str(target), kind, wanted, repr(SHARE), repr(ANGLE)]
+        numbers = (unit.working, 0.0 if deflection is None else deflection * unit.factor, SHARE, ANGLE)
+        command = [sys.executable, str(PROGRAM), str(source), str(target), kind, *map(repr, numbers)]
         try:
             ended = subprocess.run(
                 command, capture_output=True, timeout=PATIENCE, check=False, stdin=subprocess.DEVNULL
@@ -75,9 +121,5 @@ def _read(data: bytes, kind: str, max_faces: int, deflection: float | None, unit
         if not target.exists():
             raise MeshError(f"OpenCASCADE cannot read it as {kind.upper()}; {DAMAGED}")
         with np.load(target) as arrays:
-            vertices, faces, labels = (arrays[name] for name in ("vertices", "faces", "labels"))
-    if not len(faces):
-        raise MeshError("has no faces that bound a body: export the solid")
-    check_face_count(len(faces), max_faces)
-    groups = gathered((f"face{value}", np.flatnonzero(labels == value)) for value in np.unique(labels).tolist())
-    return Content(vertices / millimetres, faces.tolist(), groups=groups, unit=unit)
+            found = dict(arrays)
+    return found, json.loads(str(found.pop("facts")))

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...arrays import Array
+from ...arrays import Array, IntArray
 from ..errors import MeshError
 from ..groups import Groups
 
@@ -22,6 +22,8 @@ NUMBER = r"[-+]?(?:(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?|nan|inf(?:inity)?)"
 NUMBERS = re.compile(rf"{NUMBER}(?: {NUMBER})*+", re.ASCII | re.IGNORECASE)
 WHOLE_NUMBERS = re.compile(r"[-+]?\d{1,18}(?: [-+]?\d{1,18})*+", re.ASCII)
 
+Solids = tuple[tuple[str, IntArray], ...]  # names and face numbers
+
 
 @dataclass(frozen=True, eq=False)
 class Content:
@@ -29,7 +31,7 @@ class Content:
 
     vertices: (n, 3). polygons: the vertex numbers of each face, counted from 0; they may be out of range.
     notices: one line each on data that were left out or changed. groups: numbers of polygons by name. unit: of lengths,
-    "" where the format has none.
+    "" where the format has none. solids: where there are several, the name of each, or "", and its triangles.
     """
 
     vertices: Array
@@ -37,6 +39,7 @@ class Content:
     notices: tuple[str, ...] = ()
     groups: Groups = field(default_factory=dict)
     unit: str = ""
+    solids: Solids = ()
 
 
 def most_bytes(max_faces: int) -> int:

@@ -18,7 +18,7 @@ from ..triangulation import triangulate
 from .archive import Archive
 from .beside import Beside, in_archive, in_folder
 from .cad import read_iges, read_step
-from .common import DAMAGED, Content, most_bytes
+from .common import DAMAGED, Content, Solids, most_bytes
 from .gltf import read_glb, read_gltf
 from .gmsh import read_gmsh
 from .medit import read_medit
@@ -60,7 +60,7 @@ PACKED = (".gz", ".zip")
 class RawMesh:
     """Triangles before any repair: vertices (n, 3), faces (m, 3) with valid indices, groups; sha256 of the source.
 
-    unit: of lengths, "" where it is not known.
+    unit: of lengths, "" where it is not known. solids: where there are several, the name of each, and its faces.
     """
 
     vertices: Array
@@ -69,6 +69,7 @@ class RawMesh:
     notices: tuple[str, ...]
     groups: Groups
     unit: str = ""
+    solids: Solids = ()
 
 
 def read_mesh(path: Path, max_faces: int, deflection: float | None = None) -> RawMesh:
@@ -107,7 +108,8 @@ def read_mesh(path: Path, max_faces: int, deflection: float | None = None) -> Ra
     else:
         content = READERS[suffix](data, max_faces)
     vertices, faces, notices, groups = triangles_of(content, max_faces)
-    return RawMesh(vertices, faces, hashlib.sha256(stored).hexdigest(), unpacked + notices, groups, content.unit)
+    digest = hashlib.sha256(stored).hexdigest()
+    return RawMesh(vertices, faces, digest, unpacked + notices, groups, content.unit, content.solids)
 
 
 def _endings(name: str) -> tuple[str, str]:

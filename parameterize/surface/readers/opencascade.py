@@ -1,35 +1,88 @@
-"""A program of its own: a STEP or IGES file to the arrays of its triangles, by OpenCASCADE.
+"""A program of its own: the solids of a STEP or IGES file to the arrays of their triangles, by OpenCASCADE.
 
-`cad.py` runs it with the file, the .npz to write, the kind, the deflection in millimetres, 0 for a share of the box's
-diagonal, that share, and the angle between triangles in radians. It imports OCP and numpy alone.
+`cad.py` runs it with the file, the .npz to write, the kind, the millimetres of the unit in which lengths are wanted,
+the deflection in that unit, 0 for a share of the box's diagonal, that share, and the angle between triangles in
+radians. It imports OCP and numpy alone.
 """
 
+import json
 import sys
+from collections import Counter
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from OCP.Bnd import Bnd_Box
-from OCP.BRep import BRep_Tool
+from OCP.BRep import BRep_Builder, BRep_Tool
 from OCP.BRepBndLib import BRepBndLib
 from OCP.BRepBuilderAPI import BRepBuilderAPI_Sewing
+from OCP.BRepCheck import BRepCheck_Analyzer
+from OCP.BRepGProp import BRepGProp
 from OCP.BRepMesh import BRepMesh_IncrementalMesh
+from OCP.GProp import GProp_GProps
 from OCP.IFSelect import IFSelect_RetDone
 from OCP.IGESControl import IGESControl_Reader
+from OCP.ShapeFix import ShapeFix_Shape
 from OCP.STEPControl import STEPControl_Reader
-from OCP.TopAbs import TopAbs_FACE, TopAbs_REVERSED, TopAbs_SOLID
+from OCP.StepGeom import StepGeom_CartesianTransformationOperator3d
+from OCP.StepRepr import (
+    StepRepr_MappedItem,
+    StepRepr_NextAssemblyUsageOccurrence,
+    StepRepr_RepresentationItem,
+    StepRepr_RepresentationRelationshipWithTransformation,
+)
+from OCP.StepShape import StepShape_ShapeRepresentation, StepShape_SolidModel
+from OCP.TopAbs import (
+    TopAbs_COMPOUND,
+    TopAbs_COMPSOLID,
+    TopAbs_EDGE,
+    TopAbs_FACE,
+    TopAbs_REVERSED,
+    TopAbs_SHAPE,
+    TopAbs_SOLID,
+    TopAbs_VERTEX,
+)
 from OCP.TopExp import TopExp_Explorer
 from OCP.TopLoc import TopLoc_Location
-from OCP.TopoDS import TopoDS
+from OCP.TopoDS import TopoDS, TopoDS_Compound, TopoDS_Iterator
 
 SEWN = 1e-5  # of the box's diagonal: gaps between the faces of a model without solids that are sewn
+LEAST = 1e-6  # of its unit: its tolerance is a tenth of that, and smaller deflections are refused
+NO_AREA = 1e-10  # of the square of the diagonal: a face that needs no triangles, as its neighbours meet over it
+
+Arrays = dict[str, Any]
 
 
-def shape_of(path: str, kind: str) -> Any:
-    """Return the shape in a file, None where it cannot be read; lengths are millimetres."""
-    reader = STEPControl_Reader() if kind == "step" else IGESControl_Reader()
-    if reader.ReadFile(path) != IFSelect_RetDone or not reader.TransferRoots():
-        return None
-    return reader.OneShape()
+@dataclass(frozen=True, eq=False)
+class Part:
+    """A part of a shape, which is the same part whichever way it is turned."""
+
+    shape: Any
+
+    def __hash__(self) -> int:
+        return hash(self.shape)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Part) and bool(self.shape.IsSame(other.shape))
+
+
+def parts(shape: Any, kind: Any, outside: Any = TopAbs_SHAPE) -> dict[Part, Any]:
+    """Return the distinct parts of a kind with their shapes, in their order; those in an `outside` are passed over."""
+    explorer, found = TopExp_Explorer(shape, kind, outside), dict[Part, Any]()
+    while explorer.More():
+        found.setdefault(Part(explorer.Current()), explorer.Current())
+        explorer.Next()
+    return found
+
+
+def compound(shapes: Iterable[Any]) -> Any:
+    """Return one shape of several."""
+    builder, whole = BRep_Builder(), TopoDS_Compound()
+    builder.MakeCompound(whole)
+    for shape in shapes:
+        builder.Add(whole, shape)
+    return whole
 
 
 def diagonal(shape: Any) -> float:
@@ -39,48 +92,193 @@ def diagonal(shape: Any) -> float:
     return float(box.SquareExtent() ** 0.5)
 
 
-def sewn(shape: Any) -> Any:
-    """Return a shape whose faces have common edges: itself where it has solids, otherwise its faces, sewn."""
-    if TopExp_Explorer(shape, TopAbs_SOLID).More():
-        return shape
-    sewing = BRepBuilderAPI_Sewing(SEWN * diagonal(shape))
-    sewing.Add(shape)
+def is_mesh(shape: Any) -> bool:
+    """Return whether faces are triangles of the file rather than pieces of surfaces."""
+    return all(BRep_Tool.Surface_s(TopoDS.Face(face)) is None for face in parts(shape, TopAbs_FACE).values())
+
+
+def entities(model: Any) -> Iterator[Any]:
+    """Yield the entities of a file."""
+    return (model.Value(number) for number in range(1, model.NbEntities() + 1))
+
+
+def names_of(shape: Any, reader: Any, above: str = "") -> Iterator[tuple[Part, str]]:
+    """Yield the solids of a shape with their names or those of their products; `above` is the name of what has it."""
+    entity = reader.WS().TransferReader().EntityFromShapeResult(shape, -1)
+    names = [entity.Name()] if isinstance(entity, StepRepr_RepresentationItem) else []
+    if isinstance(entity, StepRepr_NextAssemblyUsageOccurrence):
+        names = [entity.Name(), entity.RelatedProductDefinition().Formation().OfProduct().Name()]
+    own = next((name.ToCString() for name in names if name is not None and not name.IsEmpty()), above)
+    if shape.ShapeType() == TopAbs_SOLID:
+        yield Part(shape), own
+    elif shape.ShapeType() in (TopAbs_COMPOUND, TopAbs_COMPSOLID):
+        inside = TopoDS_Iterator(shape)
+        while inside.More():
+            yield from names_of(inside.Value(), reader, own)
+            inside.Next()
+
+
+def is_changed(operator: Any) -> bool:
+    """Return whether a placement has a scale, or is a mirror: OpenCASCADE applies neither rightly."""
+    if not isinstance(operator, StepGeom_CartesianTransformationOperator3d):
+        return False
+    axes = (operator.Axis1(), operator.Axis2(), operator.Axis3())
+    rows = [[axis.DirectionRatiosValue(k) for k in (1, 2, 3)] for axis in axes if axis is not None]
+    mirrored = len(rows) == 3 and np.linalg.det(rows) < 0.0
+    return bool(mirrored or (operator.HasScale() and operator.Scale() != 1.0))
+
+
+def placements(model: Any) -> Iterator[Any]:
+    """Yield by what shapes of a STEP file are placed into others: operators of mapped items and of relations."""
+    for entity in entities(model):
+        if isinstance(entity, StepShape_ShapeRepresentation):
+            items = (entity.ItemsValue(number) for number in range(1, entity.NbItems() + 1))
+            yield from (item.MappingTarget() for item in items if isinstance(item, StepRepr_MappedItem))
+        elif isinstance(entity, StepRepr_RepresentationRelationshipWithTransformation):
+            yield entity.TransformationOperator().Value()
+
+
+def unread(reader: Any) -> int:
+    """Return how many solids of a STEP file OpenCASCADE makes no shape of."""
+    process = reader.WS().TransferReader().TransientProcess()
+    mapped = range(1, process.NbMapped() + 1)
+    made = sum(isinstance(process.Mapped(k), StepShape_SolidModel) and process.MapItem(k).HasResult() for k in mapped)
+    return sum(isinstance(entity, StepShape_SolidModel) for entity in entities(reader.StepModel())) - made
+
+
+def healed(solid: Any) -> tuple[Any, str]:
+    """Return a valid solid, repaired where it is not valid and that helps, and what was done: "", healed or invalid."""
+    if BRepCheck_Analyzer(solid).IsValid():
+        return solid, ""
+    fix = ShapeFix_Shape(solid)
+    fix.Perform()
+    found = fix.Shape()
+    if found.ShapeType() == TopAbs_SOLID and BRepCheck_Analyzer(found).IsValid():
+        return found, "healed"
+    return solid, "invalid"
+
+
+def sewn(whole: Any) -> Any:
+    """Return the faces of a model without solids with common edges."""
+    sewing = BRepBuilderAPI_Sewing(SEWN * diagonal(whole))
+    sewing.Add(whole)
     sewing.Perform()
     return sewing.SewedShape()
 
 
-def triangles(shape: Any) -> tuple[Any, Any, Any]:
-    """Return vertices (n, 3), triangles (m, 3) and the number of each triangle's face, from 1, (m,)."""
+def bodies_of(shape: Any) -> tuple[list[Any], str]:
+    """Return the solids of a shape and "solid"; those that are meshes and "mesh"; else its faces, sewn, and "faces"."""
+    solids = list(parts(shape, TopAbs_SOLID).values())
+    exact = [solid for solid in solids if not is_mesh(solid)]
+    if solids:
+        return exact or solids, "solid" if exact else "mesh"
+    faces = [face for face in parts(shape, TopAbs_FACE).values() if not is_mesh(face)]
+    return [sewn(compound(faces))] if faces else [], "faces"
+
+
+def left_out(shape: Any, bodies: list[Any], kind: str) -> Counter[str]:
+    """Return how many faces, curves and points of a shape are in none of the bodies that were taken of it."""
+    faces = parts(shape, TopAbs_FACE)
+    taken = {part for body in bodies for part in parts(body, TopAbs_FACE)}
+    beside = [face for part, face in faces.items() if part not in taken and (kind != "faces" or is_mesh(face))]
+    edges = set(parts(shape, TopAbs_EDGE, TopAbs_FACE))
+    if edges:
+        edges.difference_update(parts(compound(faces.values()), TopAbs_EDGE))
+    points = parts(shape, TopAbs_VERTEX, TopAbs_EDGE)
+    meshes = sum(map(is_mesh, beside))
+    return +Counter(
+        {"loose face": len(beside) - meshes, "mesh face": meshes, "curve": len(edges), "point": len(points)}
+    )
+
+
+def triangles(bodies: list[Any]) -> tuple[Arrays, list[tuple[int, float]]]:
+    """Return arrays, and the faces without triangles with their areas.
+
+    vertices: (n, 3). faces: (m, 3), triangles. labels: (m, 2), the face and the body of each, counted from 1.
+    """
     points: list[tuple[float, float, float]] = []
     corners: list[tuple[int, ...]] = []
-    labels: list[int] = []
-    explorer, number = TopExp_Explorer(shape, TopAbs_FACE), 0
-    while explorer.More():
-        face, place, number = TopoDS.Face(explorer.Current()), TopLoc_Location(), number + 1
-        explorer.Next()
-        found = BRep_Tool.Triangulation_s(face, place)
-        if found is None:
-            continue
-        first, where = len(points) - 1, place.Transformation()
-        for k in range(1, found.NbNodes() + 1):
-            node = found.Node(k).Transformed(where)
-            points.append((node.X(), node.Y(), node.Z()))
-        for k in range(1, found.NbTriangles() + 1):
-            row = tuple(first + corner for corner in found.Triangle(k).Get())
-            corners.append(row[::-1] if face.Orientation() == TopAbs_REVERSED else row)
-            labels.append(number)
-    return np.array(points).reshape(-1, 3), np.array(corners).reshape(-1, 3), np.array(labels)
+    labels: list[tuple[int, int]] = []
+    missing: list[tuple[int, float]] = []
+    number = 0
+    for owner, body in enumerate(bodies, start=1):
+        explorer = TopExp_Explorer(body, TopAbs_FACE)
+        while explorer.More():
+            face, place, number = TopoDS.Face(explorer.Current()), TopLoc_Location(), number + 1
+            explorer.Next()
+            found = BRep_Tool.Triangulation_s(face, place)
+            if found is None or not found.NbTriangles():
+                missing.append((number, area(face)))
+                continue
+            first, where = len(points) - 1, place.Transformation()
+            for k in range(1, found.NbNodes() + 1):
+                node = found.Node(k).Transformed(where)
+                points.append((node.X(), node.Y(), node.Z()))
+            for k in range(1, found.NbTriangles() + 1):
+                row = tuple(first + corner for corner in found.Triangle(k).Get())
+                corners.append(row[::-1] if face.Orientation() == TopAbs_REVERSED else row)
+                labels.append((number, owner))
+    arrays = {
+        "vertices": np.array(points, dtype=float).reshape(-1, 3),
+        "faces": np.array(corners, dtype=int).reshape(-1, 3),
+        "labels": np.array(labels, dtype=int).reshape(-1, 2),
+    }
+    return arrays, missing
 
 
-def main(source: str, target: str, kind: str, deflection: str, share: str, angle: str) -> None:
-    """Write the arrays vertices, faces and labels; nothing where the file cannot be read."""
-    shape = shape_of(source, kind)
-    if shape is None or shape.IsNull():
+def area(face: Any) -> float:
+    """Return the area of a face."""
+    found = GProp_GProps()
+    BRepGProp.SurfaceProperties_s(face, found)
+    return float(found.Mass())
+
+
+def read(path: str, kind: str, millimetres: float) -> tuple[Any, Counter[str]] | None:
+    """Return the reader of a file, in a unit, and of what it makes no shape; None where it cannot be read."""
+    reader = STEPControl_Reader() if kind == "step" else IGESControl_Reader()
+    if reader.ReadFile(path) != IFSelect_RetDone:
+        return None
+    if kind == "step":
+        reader.SetSystemLengthUnit(millimetres)
+    else:
+        section = reader.IGESModel().GlobalSection()
+        section.SetCascadeUnit(millimetres)
+        reader.IGESModel().SetGlobalSection(section)
+    lost = Counter({"other entity": reader.NbRootsForTransfer() - reader.TransferRoots()})
+    if kind == "step":
+        lost["solid that is not read"] = unread(reader)
+    return reader, lost
+
+
+def main(source: str, target: str, kind: str, millimetres: str, deflection: str, share: str, angle: str) -> None:
+    """Write the arrays of `triangles`, and `facts`, a text of JSON; nothing where the file cannot be read."""
+    found = read(source, kind, float(millimetres))
+    if found is None:
         return
-    shape = sewn(shape)
-    BRepMesh_IncrementalMesh(shape, float(deflection) or float(share) * diagonal(shape), False, float(angle), False)
-    vertices, faces, labels = triangles(shape)
-    np.savez(target, vertices=vertices, faces=faces, labels=labels)
+    reader, lost = found
+    shape = compound([]) if reader.OneShape().IsNull() else reader.OneShape()
+    bodies, what = bodies_of(shape)
+    beside = left_out(shape, bodies, what) + lost
+    known = dict(names_of(shape, reader)) if len(bodies) > 1 else {}
+    names = [known.get(Part(body), "") for body in bodies] if len(bodies) > 1 else []
+    states: list[str] = []
+    if what == "solid":
+        bodies, states = map(list, zip(*map(healed, bodies), strict=True))
+    size = diagonal(compound(bodies)) if bodies else 0.0
+    wanted = max(float(deflection) or float(share) * size, LEAST)
+    for body in bodies:
+        BRepMesh_IncrementalMesh(body, wanted, False, float(angle), False)
+    arrays, areas = triangles(bodies)
+    facts = {
+        "what": what,
+        "left_out": beside,
+        "names": names,
+        "size": size,
+        "states": Counter(states),
+        "missing": [number for number, found in areas if found > NO_AREA * size**2],
+        "changed": kind == "step" and any(map(is_changed, placements(reader.StepModel()))),
+    }
+    np.savez(target, facts=np.array(json.dumps(facts)), **arrays)
 
 
 if __name__ == "__main__":
