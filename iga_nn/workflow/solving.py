@@ -46,6 +46,8 @@ def solve_levels(
     options = replace(options, certified=verdict_of(state))
     done = kept.load(body, problem) if kept else Levels()
     left = sorted(statement.refine)[len(done.refine) :]
+    if done.refine:
+        state.write(**{statement.section: section_of(statement, problem, body, done)})
     if problem.form.components == 1:
         options = replace(options, start=done.finest)
 
