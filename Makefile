@@ -5,7 +5,7 @@ RUN := .venv/.run
 DEV := .venv/.dev
 INSTALL := $(BIN)/python -m pip install -c constraints.txt
 
-.PHONY: setup setup-dev demo docs test lint validate stress fuzz audit
+.PHONY: setup setup-dev demo docs test lint validate stress fuzz audit disturbed
 
 setup: $(RUN)
 
@@ -44,6 +44,12 @@ lint: $(DEV)
 	$(BIN)/ruff format --check
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+
+# The suite as other processors round: with control points moved by 1e-15, then with plain kernels.
+disturbed: $(DEV)
+	PYTHONPATH=tests/support OMP_NUM_THREADS=1 $(BIN)/python -m pytest -p disturbed -n 2 --dist loadfile
+	NPY_DISABLE_CPU_FEATURES="X86_V3 X86_V4" NUMBA_CPU_NAME=generic OPENBLAS_CORETYPE=Nehalem OMP_NUM_THREADS=1 \
+		$(BIN)/python -m pytest -n 2 --dist loadfile
 
 validate: $(DEV)
 	$(BIN)/python examples/validation.py
