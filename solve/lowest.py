@@ -107,8 +107,13 @@ class Pencil:
             forces, fill = x.stiff - x.heavy * values, rng.standard_normal((size, block - len(values)))
             fill -= x.heavy @ (x.x.T @ fill)
             forces = self._forces(np.concatenate([forces, fill], axis=1))
+            residuals = (np.linalg.norm(forces[:, : x.count], axis=0) / np.linalg.norm(x.stiff, axis=0))[:n]
+            if len(residuals) == n and residuals.max() <= tolerance:  # no solve more
+                return self._ended(values[:n], x.x[:, :n], residuals, len(history) - 1, float(residuals.max()))
             searched = self.inverse(forces)
-            residuals = self._residuals(forces, searched, x, values)[:n]
+            if self.inverse.is_exact:  # in the norm of K^-1 stiff directions, where rounding leaves most, count little
+                works = (forces * searched)[:, : x.count].sum(axis=0)
+                residuals = np.sqrt(np.abs(works) / values)[:n]
             history.append(float(residuals.max()) if len(residuals) == n else np.inf)
             made = len(history) - 2
             if history[-1] <= tolerance or made >= most or _stalls(history):
@@ -120,17 +125,6 @@ class Pencil:
             values, weights = ritz(x.beside(new), block)
             steps = new.times(weights[x.count :])
             x = self._block(x.x @ weights[: x.count] + steps.x)  # products anew: rounding does not add up
-
-    def _residuals(self, forces: Array, searched: Array, x: Block, values: Array) -> Array:
-        """Return the residuals of x, relative to its elastic forces; searched: the forces times the inverse.
-
-        With a factor they are those in the norm of K^-1, in which stiff directions, where rounding leaves most, count
-        little.
-        """
-        forces, searched = forces[:, : x.count], searched[:, : x.count]
-        if self.inverse.is_exact:
-            return np.asarray(np.sqrt(np.abs((forces * searched).sum(axis=0)) / values))
-        return np.asarray(np.linalg.norm(forces, axis=0) / np.linalg.norm(x.stiff, axis=0))
 
     def _ended(self, values: Array, x: Array, residuals: Array, made: int, worst: float) -> Lowest:
         """Return what was found, with what rounding changes: products with a third of x round differently."""
