@@ -48,7 +48,7 @@ def write_certificate(state: RunFolder, path: Path, body: BSplineVolume | MultiP
 
 
 def _measured_beside(path: Path, facts: dict[str, Any]) -> dict[str, Any]:
-    """Return how far a saved volume is from its surface, from the report of the run in its folder; empty without one."""
+    """Return how far a saved volume is from its surface, by the report of the run in its folder; else nothing."""
     report = reports.read(path.parent) if path.name == "volume.npz" else None
     known = (report or {}).get("parameterization", {})
     if any(known.get(name) != reports.plain(facts[name]) for name in ("control_points", "det_lower_bound")):
