@@ -1,13 +1,14 @@
 """MFEM NURBS meshes of several patches: written ones are read by MFEM itself, those of MFEM here and there alike."""
 
 from dataclasses import replace
+from importlib.util import find_spec
 from itertools import product
 from pathlib import Path
 
 import numpy as np
 import pytest
 from bodies import exact_ring, ring, row_of, turned
-from foreign_files import mfem_patches
+from foreign_files import mfem_patches, mfem_shuffled
 from foreign_models import patch_files
 from glued import POINTS, demand_same
 from volumes import spans_at
@@ -190,3 +191,80 @@ def test_meshes_that_come_with_mfem_open(name, patches, interfaces):
     if not path.is_file():
         pytest.skip(f"{path} does not come with this MFEM")
     demand_alike(path, patches, interfaces)
+
+
+def uneven(place, turn):
+    """A bent box of which no knot vector is the same from both ends, turned."""
+    knots = [np.array([0.0, 0.0, 0.0, inner, 1.0, 1.0, 1.0]) for inner in (0.25, 0.375, 0.125)]
+    net = np.stack(np.meshgrid(*[(row[1:5] + row[2:6]) / 2 for row in knots], indexing="ij"), axis=-1) + place
+    bent = net + 0.1 * np.roll(net, 1, axis=-1) ** 2
+    return turned(iga_nn.BSplineVolume((2, 2, 2), tuple(knots), bent), *turn)
+
+
+TWO_WAYS = [((0, 1, 2), (False, False, False)), ((2, 0, 1), (True, True, False)), ((0, 1, 2), (True, True, False))]
+UNEVEN = {
+    "corner": iga_nn.MultiPatch.from_patches(list(map(uneven, CORNER, TWO_WAYS))),
+    "block": iga_nn.MultiPatch.from_patches(list(map(uneven, BLOCK, (TWO_WAYS * 3)[:8]))),
+}
+
+
+@pytest.mark.parametrize("name", UNEVEN)
+def test_knots_that_differ_from_their_reverse_run_the_right_way(name, in_folder):
+    """In what MFEM reads of an export, and in what is read of MFEM's own mesh with vertices in any order."""
+    body = UNEVEN[name]
+    body.save("body.npz")
+    path = iga_nn.export("body.npz", "mfem")
+    assert np.abs(in_mfem(path, body)[0] - [patch(POINTS) for patch in body]).max() < 1e-12
+    assert (
+        np.abs(np.array([patch(POINTS) for patch in iga_nn.load_volume(path)]) - in_mfem(path, body)[0]).max() < 1e-12
+    )
+
+
+@pytest.mark.parametrize("name", UNEVEN)
+@pytest.mark.parametrize("seed", range(3))
+def test_a_mesh_of_mfem_with_shuffled_vertices_is_read(name, seed, in_folder):
+    """MFEM lists every edge from its lower vertex: the four edges of a patch in one direction run different ways."""
+    body = UNEVEN[name]
+    Path("patches.mesh").write_text(mfem_shuffled(body, seed))
+    mfem = pytest.importorskip("mfem.ser")
+    mfem.Mesh("patches.mesh", 1, 0).Print("printed.mesh", 17)
+    ways = {start < end for start, end in edges_of("printed.mesh")}
+    assert ways == {True}
+    for one, other in zip(iga_nn.load_volume("printed.mesh"), body, strict=True):
+        assert np.abs(one(POINTS) - other(POINTS)).max() < 1e-12
+
+
+def edges_of(path):
+    """The edges that a mesh lists, start and end."""
+    rows = Path(path).read_text().split("edges\n")[1].splitlines()
+    return [tuple(map(int, row.split()))[1:] for row in rows[1 : 1 + int(rows[0])]]
+
+
+def test_edges_from_their_lower_vertices_say_nothing_of_the_way_of_knots(in_folder):
+    """MFEM takes it from the edges between vertices 0 and 1, 1 and 2, 0 and 4: here 7 and 2, so u runs from u1 to u0.
+
+    The knots in u are 0, 3/4, 1 from vertex 2 on, and the control points there lie at x = 1, 1/4 and 0.
+    """
+    element = [7, 2, 3, 6, 0, 5, 4, 1]
+    along = {
+        0: [(0, 1), (3, 2), (4, 5), (7, 6)],
+        1: [(0, 3), (1, 2), (4, 7), (5, 6)],
+        2: [(0, 4), (1, 5), (2, 6), (3, 7)],
+    }
+    edges = [(axis, *sorted((element[a], element[b]))) for axis, pairs in along.items() for a, b in pairs]
+    places = [[x, y, z] for z in (0, 1) for x, y in ((0, 0), (1, 0), (1, 1), (0, 1))]
+    rows = [places[element.index(number)] for number in range(8)]
+    rows += [[0.25, *rows[start][1:]] for axis, start, _ in edges if axis == 0]
+    lines = ["MFEM NURBS mesh v1.0", "dimension", "3", "elements", "1", f"1 5 {spaced(element)}", "boundary", "0"]
+    lines += ["edges", "12", *map(spaced, edges), "vertices", "8", "knotvectors", "3", "1 3 0 0 0.75 1 1"]
+    lines += ["1 2 0 0 1 1"] * 2 + ["unitweights", "FiniteElementSpace", "FiniteElementCollection: NURBS1"]
+    Path("one.mesh").write_text("\n".join([*lines, "VDim: 3", "Ordering: 1", *map(spaced, rows), ""]))
+    volume = iga_nn.load_volume("one.mesh")
+    assert volume.knots[0].tolist() == [0.0, 0.0, 0.25, 1.0, 1.0]
+    assert np.abs(volume(POINTS) - POINTS).max() < 1e-15
+    if find_spec("mfem"):
+        assert np.abs(in_mfem("one.mesh", [volume])[0] - POINTS).max() < 1e-12
+
+
+def spaced(row):
+    return " ".join(map(str, row))

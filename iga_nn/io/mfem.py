@@ -10,7 +10,7 @@ from parameterize.arrays import Array
 from parameterize.spline.interface import Face
 from parameterize.spline.volume import BSplineVolume
 
-from .mfem_layout import Layout
+from .mfem_layout import Layout, turned_knots
 from .patches import patch_of, projected
 from .words import Words
 
@@ -43,7 +43,7 @@ def read_mfem(text: str) -> tuple[list[BSplineVolume], list[tuple[Face, Face]]]:
     patches = []
     for number, (axes, places) in enumerate(zip(layout.axes, layout.numbers(counts), strict=True)):
         chosen = places.ravel(order="F")
-        degrees, knots = [vectors[k][0] for k, _ in axes], [_turned(vectors[k][1], back) for k, back in axes]
+        degrees, knots = [vectors[k][0] for k, _ in axes], [turned_knots(vectors[k][1], back) for k, back in axes]
         try:
             patches.append(patch_of(degrees, knots, rows[chosen], weights[chosen]))
         except ValueError as error:
@@ -92,11 +92,6 @@ def _read_knots(words: Words) -> KnotVector:
             f"a knot vector of degree {degree} has {count} control points; the degree must be 1 to {count - 1}"
         )
     return degree, words.reals(degree + count + 1, "knots")
-
-
-def _turned(knots: Array, back: bool) -> Array:
-    """Return a knot vector, where `back` the other way."""
-    return knots[0] + (knots[-1] - knots[::-1]) if back else knots
 
 
 def _read_patch(words: Words, name: str) -> BSplineVolume:

@@ -13,7 +13,7 @@ from math import prod
 
 import numpy as np
 
-from parameterize.arrays import IntArray
+from parameterize.arrays import Array, IntArray
 from parameterize.spline.interface import Face, axis_side, face_layer, varying
 
 # the corners of a hexahedron in MFEM's order, as (u, v, w)
@@ -21,6 +21,7 @@ CORNERS = ((0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1,
 # its faces in MFEM's order, each seen from outside
 FACES = {"w0": (3, 2, 1, 0), "v0": (0, 1, 5, 4), "u1": (1, 2, 6, 5), "v1": (2, 3, 7, 6), "u0": (3, 0, 4, 7)}
 FACES |= {"w1": (4, 5, 6, 7)}
+LEADING = (0, 2, 0)  # of the four edges in a direction the one by which MFEM takes the way: from vertex 0, 1 and 0
 
 
 @dataclass(frozen=True)
@@ -68,22 +69,28 @@ class Layout:
     def axes(self) -> list[list[tuple[int, bool]]]:
         """Return for each patch and direction the knot vector, and whether it runs the other way.
 
-        Raises ValueError where an edge is missing, or the four edges in a direction differ.
+        Of patches whose edges run along with each other the leading edge of the last one tells the way, as in MFEM.
+        Where it writes a mesh, it lists all edges from their lower vertices, whichever way the knots run. Raises
+        ValueError where an edge is missing, or the four edges in a direction have different knot vectors.
         """
         listed = {}
         for knots, start, end in self.edges.tolist():
             listed[start, end], listed[end, start] = (knots, False), (knots, True)
-        found = []
         for number, corners in enumerate(self.corners):
-            edges = [[(a, b) for a, b in edges_along(corners, axis)] for axis in range(3)]
-            if missing := [ends for row in edges for ends in row if ends not in listed]:
-                raise ValueError(
-                    f"element {number}: has no edge between the vertices {missing[0][0]} and {missing[0][1]}"
-                )
-            along = [{listed[ends] for ends in row} for row in edges]
-            if any(len(ways) > 1 for ways in along):
-                raise ValueError(f"element {number}: its edges in one direction have different knot vectors, or ways")
-            found.append([ways.pop() for ways in along])
+            for edges in (edges_along(corners, axis) for axis in range(3)):
+                if missing := [ends for ends in edges if tuple(ends) not in listed]:
+                    raise ValueError(
+                        f"element {number}: has no edge between the vertices {missing[0][0]} and {missing[0][1]}"
+                    )
+                if len({listed[start, end][0] for start, end in edges}) > 1:
+                    raise ValueError(f"element {number}: its edges in one direction have different knot vectors")
+        found = [[(0, False)] * 3 for _ in self.hexahedra]
+        for bundle in bundles(self.corners):
+            last, axis, is_back = max(bundle)
+            start, end = leading_edge(self.corners[last], axis)
+            knots, is_turned = listed[start, end]
+            for number, own_axis, back in bundle:
+                found[number][own_axis] = knots, is_turned != (back != is_back)
         return found
 
     def shapes(self, counts: Sequence[int]) -> list[tuple[int, ...]]:
@@ -167,6 +174,42 @@ class Layout:
 def edges_along(corners: IntArray, axis: int) -> list[list[int]]:
     """Return start and end (4, 2) of the edges of a patch in a direction; corners: its vertices (2, 2, 2)."""
     return np.moveaxis(corners, axis, -1).reshape(4, 2).tolist()
+
+
+def turned_knots(knots: Array, back: bool) -> Array:
+    """Return a knot vector, the other way where `back`."""
+    return knots[0] + (knots[-1] - knots[::-1]) if back else knots
+
+
+def leading_edge(corners: IntArray, axis: int) -> list[int]:
+    """Return start and end of the edge that tells which way the knots run; corners: of a patch, (2, 2, 2)."""
+    return edges_along(corners, axis)[LEADING[axis]]
+
+
+def bundles(cubes: IntArray) -> Iterator[list[tuple[int, int, bool]]]:
+    """Yield the directions of patches whose edges run along with each other: patch, axis, whether the other way.
+
+    cubes: the vertices of the patches (n, 2, 2, 2). Patches that share an edge run along with each other there.
+    """
+    axes = {(number, axis): edges_along(cube, axis) for number, cube in enumerate(cubes) for axis in range(3)}
+    meeting: dict[frozenset[int], list[tuple[int, int]]] = {}
+    for place, edges in axes.items():
+        for pair in edges:
+            meeting.setdefault(frozenset(pair), []).append(place)
+    seen: set[tuple[int, int]] = set()
+    for first in axes:
+        bundle, waiting = [], [] if first in seen else [(*first, False)]
+        seen.add(first)
+        while waiting:
+            number, axis, back = waiting.pop()
+            bundle.append((number, axis, back))
+            for pair in axes[number, axis]:
+                for other in meeting[frozenset(pair)]:
+                    if other not in seen:
+                        seen.add(other)
+                        waiting.append((*other, back != (pair not in axes[other])))
+        if bundle:
+            yield bundle
 
 
 def _laid(grid: IntArray, corners: IntArray, origin: int, towards: int) -> IntArray:

@@ -24,7 +24,7 @@ from solve.field import SplineField
 
 from ..errors import InputError
 from .mfem import CUBE, HEADS, SQUARE, KnotVector
-from .mfem_layout import CORNERS, FACES, Layout, edges_along
+from .mfem_layout import CORNERS, FACES, Layout, bundles, edges_along, leading_edge, turned_knots
 from .patches import as_text
 
 log = logging.getLogger(__name__)
@@ -160,46 +160,25 @@ def _layout_of(body: MultiPatch) -> tuple[Layout, list[KnotVector]]:
 def _edges(body: MultiPatch, cubes: IntArray) -> tuple[IntArray, list[KnotVector]]:
     """Return the edges (m, 3) of a body, each with its knot vector, start and end, and the knot vectors.
 
-    Edges that lie opposite each other in a patch have the same knot vector. cubes: the vertices (n, 2, 2, 2) of the
-    patches.
+    Edges that lie opposite each other in a patch have the same knot vector. It runs from the lower to the higher vertex
+    of their leading edge, and all edges are listed from their lower vertices, as MFEM writes them: MFEM 4.10 reads
+    knots the wrong way where an edge is listed otherwise. cubes: the vertices (n, 2, 2, 2) of the patches.
     """
-    axes = [(number, axis, edges_along(cubes[number], axis)) for number in range(len(body)) for axis in range(3)]
-    meeting: dict[frozenset[int], list[int]] = {}
-    for place, (_, _, ends) in enumerate(axes):
-        for pair in ends:
-            meeting.setdefault(frozenset(pair), []).append(place)
     listed: dict[frozenset[int], list[int]] = {}
     knots: list[KnotVector] = []
-    for first, (number, axis, _) in enumerate(axes):
-        if all(frozenset(pair) in listed for pair in axes[first][2]):
-            continue
-        knots.append((body.patches[number].degrees[axis], body.patches[number].knots[axis]))
-        for pair in _parallel(first, [ends for _, _, ends in axes], meeting):
-            if listed.setdefault(frozenset(pair), [len(knots) - 1, *pair])[1:] != pair:
-                raise InputError(
-                    "an MFEM mesh cannot hold this body: a direction of its patches comes back the other way round, as "
-                    "on a Moebius strip; export it --to gismo"
-                )
-    return np.array(list(listed.values())), knots
-
-
-def _parallel(
-    first: int, axes: Sequence[list[list[int]]], meeting: dict[frozenset[int], list[int]]
-) -> Iterator[list[int]]:
-    """Yield start and end of the edges that run along with those of one direction of a patch, through all patches.
-
-    axes: the four edges of each direction of each patch. meeting: the directions that have an edge.
-    """
-    seen, waiting = {first}, [(first, False)]
-    while waiting:
-        place, back = waiting.pop()
-        for start, end in axes[place]:
-            pair = [end, start] if back else [start, end]
-            yield pair
-            for other in meeting[frozenset(pair)]:
-                if other not in seen:
-                    seen.add(other)
-                    waiting.append((other, pair not in axes[other]))
+    for bundle in bundles(cubes):
+        last, axis, is_back = max(bundle)
+        start, end = leading_edge(cubes[last], axis)
+        knots.append((body.patches[last].degrees[axis], turned_knots(body.patches[last].knots[axis], start > end)))
+        for number, own_axis, back in bundle:
+            way = -1 if (back != is_back) != (start > end) else 1
+            for pair in (ends[::way] for ends in edges_along(cubes[number], own_axis)):
+                if listed.setdefault(frozenset(pair), [len(knots) - 1, *pair])[1:] != pair:
+                    raise InputError(
+                        "an MFEM mesh cannot hold this body: a direction of its patches comes back the other way "
+                        "round, as on a Moebius strip; export it --to gismo"
+                    )
+    return np.array([[number, *sorted(pair)] for number, *pair in listed.values()]), knots
 
 
 def _demand_same(body: MultiPatch, places: Sequence[IntArray]) -> None:

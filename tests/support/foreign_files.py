@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from iga_nn.io.mfem_layout import CORNERS
 from parameterize.spline.multipatch import MultiPatch
 from parameterize.spline.volume import FACE_NAMES
 
@@ -47,3 +48,33 @@ def mfem_patches(kind="controlpoints", weight=1):
     head = "MFEM NURBS mesh v1.0\n\n# Two cubes.\n\ndimension\n3\n\nelements\n2\n"
     head += "1 5 0 1 4 3 6 7 10 9\n1 5 5 4 1 2 11 10 7 8\n\nboundary\n0\n\nedges\n0\n\nvertices\n12\n\npatches\n"
     return "\n".join([head, *patches])
+
+
+def mfem_shuffled(body: MultiPatch, seed=0):
+    """The patches of a right-handed body in MFEM's format, with their vertices numbered at random."""
+    corners = [patch.control_points[np.ix_(*[[0, -1]] * 3)] for patch in body]
+    points = np.unique(np.round(np.reshape(corners, (-1, 3)), 9), axis=0)
+    points = np.random.default_rng(seed).permutation(points)
+    hexahedra = [[int(np.abs(points - net[corner]).sum(axis=1).argmin()) for corner in CORNERS] for net in corners]
+    lines = [
+        "MFEM NURBS mesh v1.0",
+        "dimension",
+        "3",
+        "elements",
+        str(len(body)),
+        *(f"1 5 {row(h)}" for h in hexahedra),
+    ]
+    lines += ["boundary", "0", "edges", "0", "vertices", str(len(points)), "patches"]
+    for patch in body:
+        vectors = [f"{p} {len(k) - p - 1} {row(k)}" for p, k in zip(patch.degrees, patch.knots, strict=True)]
+        net = patch.control_points.transpose(2, 1, 0, 3).reshape(-1, 3)
+        lines += [
+            "knotvectors",
+            "3",
+            *vectors,
+            "dimension",
+            "3",
+            "controlpoints",
+            *(f"{row(point)} 1" for point in net),
+        ]
+    return "\n".join(lines) + "\n"
