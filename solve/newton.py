@@ -17,7 +17,9 @@ from .assembly import assemble_data
 from .diagnostics import ConvergenceError, judge
 from .discretization.errors import Part, error_norms
 from .discretization.nonlinear import Forces, Tangent
+from .discretization.on_regions import demand_area
 from .discretization.space import TrialSpace, embedded, longest_edge
+from .discretization.weak import WeakFace
 from .field import SplineField
 from .forms.boundary_value_problem import BoundaryValueProblem
 from .forms.form import Form
@@ -83,7 +85,8 @@ def newton(
     Raises
     ------
     ValueError
-        For arguments out of range, and for a law without a derivative, or whose derivative contradicts `symmetric`.
+        For arguments out of range, for a law without a derivative, or whose derivative contradicts `symmetric`, for
+        regions without area, and where fluxes alone are given.
     ConvergenceError
         Where the tolerance is not met.
 
@@ -114,9 +117,9 @@ def newton(
     demand_volume(volume)
     placed, (patch,) = prepared(volume, problem, options)
     space = patch.space
-    if len(placed.natural) == 6 and not placed.form.has_reaction:
+    if placed.fixes_nothing and not placed.form.has_reaction:
         raise ValueError(
-            "newton: Neumann data on all six faces do not determine the solution: name one face in boundary or robin"
+            "newton: fluxes alone do not determine the solution: give a value, or an exchange, on a face or a region"
         )
     with one_blas_thread():
         balance = _Balance.of(volume, placed, space, options, linear_iterations)
@@ -148,11 +151,13 @@ class _Balance:
     def of(
         cls, volume: BSplineVolume, problem: Any, space: TrialSpace, options: SolveOptions, linear_iterations: int
     ) -> "_Balance":
-        """Return the balance of a problem.
+        """Return the balance of a problem. Raises ValueError where a region has no area that is free of values.
 
         linear_iterations: the largest number of iterations of the linear solver in a Newton step.
         """
         operator, load, known = assemble_data(volume, _Loads(problem), space, options)  # type: ignore[arg-type]
+        on_regions = [face for face in operator.faces.values() if isinstance(face, WeakFace)]
+        demand_area(problem, on_regions, space, [volume])
         is_fixed = np.ones(load.shape, dtype=bool)
         is_fixed[:, *space.window] = False
         return cls(Forces.of(operator, volume, problem.form), load, known, is_fixed, options, linear_iterations)

@@ -169,3 +169,50 @@ def test_what_cannot_be_solved_is_refused():
         iga_nn.newton(volume, iga_nn.Problem(Warm(), **data), load_steps=0)
     with pytest.raises(ConvergenceError, match="no convergence, residual .* after 1 iterations: raise load_steps"):
         iga_nn.newton(volume, iga_nn.Problem(Warm(), exact="3*x"), max_iterations=1)
+
+
+class Thawing(iga_nn.Form):
+    """A conductivity 1 + u."""
+
+    linear = symmetric = False
+
+    def flux(self, u, grad, x):
+        return (1.0 + u[0]) * grad
+
+
+BAR = iga_nn.BSplineVolume.from_function(lambda u, v, w: (4.0 * u, v, w), control_points=5)
+
+
+def thawing(**conditions):
+    return iga_nn.newton(BAR, iga_nn.Problem(Thawing(), source="0", **conditions), refine=1)
+
+
+@pytest.mark.parametrize(
+    "conditions",
+    [
+        {"value": {"u0": 0, "u1": 1}},
+        {"value": {"u0": 0}, "inflow": {"nx > 0.99": 0.375}},
+        {"value": {"u0": 0}, "inflow": {"nx > 0.99 and y < 0.5": 0.375, "nx > 0.99 and y > 0.5": 0.375}},
+        {"value": {"u0": 0}, "inflow": {"nx > 0.99": 0.3, "u1": 0.075}},
+        {"value": {"u0": 0}, "exchange": {"nx > 0.99": (0.375, 2)}},
+    ],
+    ids=["values", "inflow", "two halves", "overlap", "exchange"],
+)
+def test_data_on_regions_give_the_solution_of_a_bar(conditions):
+    """(1 + u) u' = 3/8 with u(0) = 0 has u + u^2 / 2 = 3 x / 8, so u(4) = 1 and u(2) = sqrt(5/2) - 1."""
+    assert thawing(**conditions).probe([[2.0, 0.5, 0.5]])[0] == pytest.approx(np.sqrt(2.5) - 1.0, abs=2e-5)
+
+
+@pytest.mark.parametrize(
+    ("conditions", "says"),
+    [
+        ({"value": {"u0": 0}, "inflow": {"x > 9": 1}}, "flux 'x > 9': no part of the boundary lies there"),
+        ({"value": {"u0": 0}, "exchange": {"x > 9": (1, 2)}}, "exchange 'x > 9': no part of the boundary lies there"),
+        ({"value": {"u0": 0}, "inflow": {"nx < -0.99": 1}}, "flux 'nx < -0.99': no part of the boundary lies there"),
+        ({"inflow": {"u0": 1, "u1": -1}}, "fluxes alone do not determine the solution"),
+        ({"value": {"u0": 0, "x > 3.99": 1}}, "value 'x > 3.99': newton holds all of u on whole faces"),
+    ],
+)
+def test_data_on_regions_that_are_not_taken_are_refused(conditions, says):
+    with pytest.raises(ValueError, match=says):
+        thawing(**conditions)
