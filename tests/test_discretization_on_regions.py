@@ -182,3 +182,15 @@ def test_a_region_of_the_cube_is_held_by_the_space_itself():
 def test_modes_of_a_body_on_rollers_leave_its_free_motions_out():
     found = iga_nn.modes(BAR, Elasticity(roller="nx < -0.5", young=100.0, poisson_ratio=0.0), n=1)
     assert found.rigid == 3  # two shifts along the plane and a turn in it
+
+
+@pytest.mark.parametrize("thickness", [1e-3, 2e-5])
+def test_a_foil_that_is_held_along_its_edge_is_held(thickness):
+    """Pulled across at its other end it bends by F L^3 / (3 E I); turned about the edge, the edge hardly moves."""
+    foil = iga_nn.BSplineVolume.from_function(lambda u, v, w: (u, v, thickness * w), (5, 4, 4))
+    load = {"nx > 0.99": (0, 0, thickness**2)}
+    law = iga_nn.Elasticity(young=1.0, poisson_ratio=0.0, fix="nx < -0.99", load=load)
+    down = iga_nn.solve(foil, law, max_iterations=3000)([[1.0, 0.5, 0.5]])[0, 2]
+    assert down == pytest.approx(4.0, rel=1e-3)
+    with pytest.raises(ValueError, match=r"free to move: of its shifts along and turns about x, y, z, \("):
+        iga_nn.solve(foil, iga_nn.Elasticity(young=1.0, roller="nx < -0.99", load={"nx > 0.99": (1, 0, 0)}))

@@ -31,7 +31,8 @@ DEPTHS = (0.5, 1.0)  # of the span behind a face, at which the map's change is l
 CONTRADICTION = 1e-6  # share of their size by which two values of one component may differ
 RIM = 1e-6  # share of a region's area on a face that may lie in another one, too, as "y < 1e-9" beside "x > 1"
 PARALLEL = 1e-6  # length of a direction's part that no other direction holds, from which on it is held too
-LOOSE = 1e-10  # of the best held motion, from which on one counts as free
+AT_REST = 1e-15  # share of the largest mean square of a motion at the supports, up to which another leaves them at rest
+SLIDES = 1e-10  # share of the mean square of a motion that supports hold, up to which it slides along them
 WHOLE = 0.999  # share of a face's parameters that a region must cover to count as all of it
 
 
@@ -83,20 +84,34 @@ def demand_supports(
         raise ValueError("no support holds the body: give fix, roller, symmetry or spring")
     size = size_of(volumes)
     middle = space.total(sum(face.x @ weights for face, weights in zip(faces, holding, strict=True))) / area
-    gram = 0.0
-    for face in faces:
+    moved = held = 0.0
+    for face, weights in zip(faces, holding, strict=True):
         motions = problem.form.free_motions((np.asarray(face.x) - middle[:, None]) / size)
-        held = np.einsum("cdm,kdm->kcm", face.projector, motions)
-        loose = (motions - held) * (face.factor > 0.0)
-        gram = gram + np.einsum("kcm,lcm,m->kl", held, held, face.weights)
-        gram = gram + np.einsum("kcm,lcm,m->kl", loose, loose, face.weights)
-    values, vectors = np.linalg.eigh(space.total(gram) / area)
-    if values[0] < LOOSE * values[-1]:
-        free = ", ".join(f"{part:.2g}" for part in vectors[:, 0].round(3) + 0.0)
+        sprung = face.factor > 0.0
+        kept = np.where(sprung, motions, np.einsum("cdm,kdm->kcm", face.projector, motions))
+        moved = moved + np.einsum("kcm,lcm,m->kl", motions, motions, face.weights * (weights > 0.0))
+        held = held + np.einsum("kcm,lcm,m->kl", kept, kept, face.weights)
+    free = _unheld(space.total(moved) / area, space.total(held) / area)
+    if free is not None:
+        said = ", ".join(f"{part:.2g}" for part in (free / np.abs(free).max()).round(3) + 0.0)
         raise ValueError(
             "the supports leave the body free to move: of its shifts along and turns about x, y, z, "
-            f"({free}) is not held"
+            f"({said}) is not held"
         )
+
+
+def _unheld(moved: Array, held: Array) -> Array | None:
+    """Return a motion (k,) that supports do not hold, None where they hold all of them.
+
+    moved, held: (k, k), mean products of motions at the supports, and of what supports hold of them. A motion is
+    compared with itself: a turn about the edge of a foil moves little there, and is held all the same.
+    """
+    sizes, vectors = np.linalg.eigh(moved)
+    if sizes[0] <= AT_REST * sizes[-1]:
+        return np.asarray(vectors[:, 0])
+    scaled = vectors / np.sqrt(sizes)
+    shares, turned = np.linalg.eigh(scaled.T @ held @ scaled)
+    return np.asarray(scaled @ turned[:, 0]) if shares[0] <= SLIDES else None
 
 
 def _coder(problem: BoundaryValueProblem, name: str) -> Callable[[Array, Array], Any]:
