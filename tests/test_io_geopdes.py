@@ -1,5 +1,7 @@
 """Geometry files of GeoPDEs: patches, and their interfaces, which the control points show as the file lists them."""
 
+import re
+
 import numpy as np
 import pytest
 from bodies import exact_ring, ring, row_of
@@ -121,3 +123,53 @@ def test_models_of_geopdes_open_with_the_interfaces_and_orientations_that_they_l
         assert (len(body), len(body.interfaces)) == (patches, interfaces)
         assert set(body.interfaces) == {orientation_in(text, number + 1) for number in range(interfaces)}
         assert isinstance(iga_nn.load_volume(path), iga_nn.BSplineVolume if patches == 1 else iga_nn.MultiPatch)
+
+
+CUBE = ("0 1 0 1 0 1 0 1", "0 0 1 1 0 0 1 1", "0 0 0 0 1 1 1 1", "1 1 1 1 1 1 1 1")
+
+
+def cube(head="# nurbs mesh v.2.1\n3 3 1 0 0\nPATCH 1\n", knots="0 0 1 1", rows=CUBE, end=""):
+    """The unit cube in one patch of degree 1."""
+    return head + "\n".join(["1 1 1", "2 2 2", *[knots] * 3, *rows, end])
+
+
+@pytest.mark.parametrize("head", ["# nurbs geometry v.1.0\n3 3 1 0 0\nP\n", "# nurbs geometry v.0.6\n3 1\n"])
+def test_the_numbers_of_a_file_depend_on_its_version(head, in_folder):
+    """Since v.1.0 the dimension of space stands before the number of patches."""
+    assert np.abs(opened(cube(head), in_folder)(POINTS) - POINTS).max() < 1e-15
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        cube(knots="0, 0, 1, 1"),
+        cube(knots="[0 0 1 1];"),
+        cube(knots="0/3 0/3 3/3 6/6"),
+        cube(rows=(*CUBE[:3], "1D+0 1d0 1D0 1.0D+00 10d-1 1e0 +1 1.")),
+        cube().replace("PATCH 1", "2nd patch, turned"),
+        cube().replace("PATCH 1", "12 holes"),
+        cube().replace("\n", "\r\n"),
+    ],
+    ids=["commas", "brackets", "fractions", "exponents", "name", "name with a number", "line ends"],
+)
+def test_rows_as_matlab_reads_them(text, in_folder):
+    assert np.abs(opened(text, in_folder)(POINTS) - POINTS).max() < 1e-15
+
+
+@pytest.mark.parametrize("word", ["1_0", "1D", "1/2/3", "sqrt(2)", "1+1"])
+def test_words_that_are_no_numbers_are_refused(word, in_folder):
+    with pytest.raises(
+        iga_nn.InputError, match=rf"geo\.txt: line 9: the x .* must be numbers, got '{re.escape(word)}'"
+    ):
+        opened(cube(rows=(CUBE[0].replace("1", word, 1), *CUBE[1:])), in_folder)
+
+
+def test_subdomains_and_boundaries_are_told(in_folder, caplog):
+    head = "# nurbs mesh v.2.1\n3 3 1 0 2\nPATCH 1\n"
+    opened(cube(head, end="SUBDOMAIN 1\n1\nSUBDOMAIN 2\n1\nBoundary walls\n1\n1 2\n"), in_folder)
+    assert "its 2 subdomains are not read" in caplog.text and "p0_u0 (Boundary walls)" in caplog.text
+
+
+def test_one_subdomain_says_nothing(in_folder, caplog):
+    opened(cube("# nurbs mesh v.2.1\n3 3 1 0 1\nPATCH 1\n", end="SUBDOMAIN 1\n1\n"), in_folder)
+    assert not caplog.text

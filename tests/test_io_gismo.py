@@ -1,5 +1,7 @@
 """G+Smo XML of several patches: written ones are read by G+Smo itself, those of G+Smo here."""
 
+import gzip
+
 import numpy as np
 import pytest
 from bodies import exact_ring, ring, row_of
@@ -7,6 +9,7 @@ from foreign_models import patch_files
 from glued import POINTS, demand_same
 
 import iga_nn
+from iga_nn.io.formats import is_volume
 from iga_nn.io.gismo import read_gismo, write_gismo
 from parameterize.spline.interface import axis_side, varying
 from parameterize.spline.volume import FACE_NAMES
@@ -171,3 +174,52 @@ def test_models_of_gismo_open(name, patches, interfaces, tmp_path):
         write_gismo(tmp_path / "again.xml", read)
         assert isinstance(iga_nn.load_volume(path), iga_nn.BSplineVolume if patches == 1 else iga_nn.MultiPatch)
         demand_same(iga_nn.MultiPatch.from_patches(read_gismo((tmp_path / "again.xml").read_text())[0]), read)
+
+
+@pytest.mark.parametrize("name", ["file.xml.gz", "file.xml"])
+def test_packed_files_are_read(name, in_folder):
+    """By their first bytes, as G+Smo does; also to solve on, so `is_volume` knows them."""
+    (in_folder / name).write_bytes(gzip.compress(f"<xml>{cube(0)}</xml>".encode()))
+    assert np.abs(iga_nn.load_volume(name)(POINTS) - POINTS).max() < 1e-15
+    assert is_volume(name)
+    (in_folder / "part.gltf.gz").write_bytes(gzip.compress(b"{}"))
+    assert not is_volume("part.gltf.gz")
+
+
+def test_a_packed_file_that_is_cut_off_is_refused(in_folder):
+    packed = gzip.compress(f"<xml>{cube(0)}</xml>{' ' * 9}".encode() + np.random.default_rng(0).bytes(9999))
+    (in_folder / "file.xml.gz").write_bytes(packed[:-5000])
+    with pytest.raises(iga_nn.InputError, match=r"file\.xml\.gz: is not a whole \.gz file .*: save it again"):
+        iga_nn.load_volume("file.xml.gz")
+
+
+def test_comments_may_be_in_latin_1(in_folder):
+    text = f'<?xml version="1.0" encoding="ISO-8859-1"?><!-- V\u00e1zquez --><xml>{cube(0)}</xml>'
+    (in_folder / "file.xml").write_bytes(text.encode("latin-1"))
+    assert np.abs(iga_nn.load_volume("file.xml")(POINTS) - POINTS).max() < 1e-15
+
+
+def test_what_stands_beside_the_body_is_told(in_folder, caplog):
+    """Boundary conditions, functions, and geometries that the MultiPatch does not name."""
+    more = '<boundaryConditions id="4"/><Function id="5"/><MultiPatch parDim="3"><patches type="id_index">1</patches>'
+    body = opened(f"<xml>{cube(0)}{cube(1, 1)}{more}</MultiPatch></xml>", in_folder)
+    assert np.abs(body(POINTS) - POINTS - [1.0, 0.0, 0.0]).max() < 1e-15
+    assert "left out: Function, TensorBSpline3, boundaryConditions" in caplog.text
+
+
+@pytest.mark.parametrize(
+    ("content", "says"),
+    [
+        (
+            cube(0).replace("</G", "<transform><rotation>0 0 1 1.57</rotation></transform></G"),
+            "0 has a transform, which",
+        ),
+        ("<xmlfile>cube.xml</xmlfile>", "holds no Geometry, but names the file cube.xml: read that one"),
+        (cube(0, kind="TensorNurbs3"), "Geometry 0 is a TensorNurbs3 without weights"),
+        (cube(0, knots="0 0 1/0 1"), "the knots must be finite, got '1/0'"),
+        (cube(0, knots="0 0 1/ 1"), "the knots must be numbers, got '1/'"),
+    ],
+)
+def test_what_would_be_another_body_is_refused(content, says, in_folder):
+    with pytest.raises(iga_nn.InputError, match=rf"file\.xml: .*{says}"):
+        opened(f"<xml>{content}</xml>", in_folder)

@@ -268,3 +268,14 @@ def test_edges_from_their_lower_vertices_say_nothing_of_the_way_of_knots(in_fold
 
 def spaced(row):
     return " ".join(map(str, row))
+
+
+@pytest.mark.parametrize("section", ["periodic\n1\n1\n1\n3\n", "mesh_elements\n1\n0\n"])
+def test_sections_that_change_the_mesh_are_refused_by_name(section, in_folder):
+    ring(3).save("ring.npz")
+    text = iga_nn.export("ring.npz", "mfem").read_text()
+    Path("bad.mesh").write_text(text.replace("weights\n", section + "\nweights\n"))
+    with pytest.raises(
+        iga_nn.InputError, match=rf"bad\.mesh: line .*got '{section.split()[0]}'.*: save the mesh without"
+    ):
+        iga_nn.load_volume("bad.mesh")

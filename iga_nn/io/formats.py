@@ -68,10 +68,10 @@ def is_volume(path: str | Path) -> bool:
     """Return whether a file is a volume (rather than a surface), by its ending .npz or by its beginning.
 
     Surfaces begin alike (glTF as JSON, 3MF as a ZIP archive), so the ending must be one that is read here, for a volume
-    or for a surface that does not; a .zip is a volume where it holds arrays.
+    or for a surface that does not; a .zip is a volume where it holds arrays, of a .gz the ending before counts.
     """
     source = Path(path)
-    suffix = source.suffix.lower()
+    suffix = (Path(source.stem) if source.suffix.lower() == ".gz" else source).suffix.lower()
     endings = ("", ".zip", *ENDINGS.values(), *(ending for ending in SURFACES if ending not in ALIKE))
     if suffix == ".npz":
         return True

@@ -1,12 +1,15 @@
 """Reads geometry files of GeoPDEs, "nurbs mesh v.0.7" to "v.2.1", with one patch or several.
 
-After rows of comments stand the numbers of parameters, coordinates (since v.2.0), patches, interfaces and subdomains.
+After rows of comments stand the numbers of parameters, coordinates (since v.1.0), patches, interfaces and subdomains.
 A patch has its name, degrees, numbers of control points, knot vectors, a row for each homogeneous coordinate of the
 control points, u fastest, and a row of weights. An interface has its name, patch and side of either face, and the way
 they lie on each other, which the control points tell, too. Patches count from 1, sides from 1: u0, u1, v0, v1, w0, w1.
-Subdomains and boundaries, at the end, are not read. Source: geo_specs_mp_v21.txt of GeoPDEs.
+Subdomains and boundaries, at the end, are not read. GeoPDEs reads rows as MATLAB does, so numbers may stand between
+brackets, with commas, as fractions, and with exponents by D. Sources: geo_specs_v06.txt to geo_specs_mp_v21.txt,
+geo_specs_mp_v10.txt and `geo_read_nurbs` of GeoPDEs.
 """
 
+import logging
 import re
 
 import numpy as np
@@ -16,34 +19,54 @@ from parameterize.spline.interface import Face
 from parameterize.spline.volume import AXES, FACE_NAMES, BSplineVolume
 
 from .patches import patch_of, projected
-from .words import Words
+from .words import Words, is_number
+
+log = logging.getLogger(__name__)
 
 HEADER = re.compile(r"^\s*#.*nurbs (?:mesh|geometry) v\.?(\d{1,3})\.", re.IGNORECASE | re.MULTILINE)
 HEAD = 4096  # characters in which it stands
+SHOWN = 6  # names in a notice
+PUNCTUATION = str.maketrans(",;[]", "    ")  # between the numbers of a row of MATLAB
 
 
 def read_geopdes(text: str) -> tuple[list[BSplineVolume], list[tuple[Face, Face]]]:
     """Return the patches, and the pairs of faces that the file declares glued. Raises ValueError with the line."""
-    words = Words(text)
+    words = Words(text.translate(PUNCTUATION))
     header = HEADER.search(text, 0, HEAD)
-    old = header is not None and int(header[1]) < 2
+    old = header is not None and int(header[1]) < 1
     what = "the numbers of dimensions and patches"
     dimension, *rest = words.as_wholes(words.row(what), what)
     space = dimension if old or not rest else rest.pop(0)
     if (dimension, space) != (3, 3):
         raise words.fault(f"maps {dimension} parameters to {space} coordinates; a volume maps 3 to 3")
-    patches, interfaces, *_ = [*rest, *(1, 0)[len(rest) :]]
-    return (
+    patches, interfaces, *others = [*rest, *(1, 0)[len(rest) :]]
+    if not patches:
+        raise words.fault("holds no patch")
+    content = (
         [_read_patch(words, f"patch {number + 1}") for number in range(patches)],
         [_read_interface(words, f"interface {number + 1}") for number in range(interfaces)],
     )
+    if max(others, default=0) > 1:
+        log.warning("its %d subdomains are not read: name their patches, as in young={0: .., 1: ..}", max(others))
+    if boundaries := [name for name in _names_left(words) if "boundary" in name.lower()]:
+        log.warning("its boundaries are not read: name faces such as p0_u0 (%s)", ", ".join(boundaries[:SHOWN]))
+    return content
+
+
+def _names_left(words: Words) -> list[str]:
+    """Return the rows to the end of the file that are no numbers."""
+    rows = []
+    while words.peek() is not None:
+        rows.append(words.row("a name"))
+    return [" ".join(row) for row in rows if not all(map(is_number, row))]
 
 
 def _read_patch(words: Words, name: str) -> BSplineVolume:
     """Return the next patch. name: for errors."""
-    if not (words.peek() or "").isdigit():
-        words.row(f"the name of {name}")
-    degrees = _wholes(words, 3, f"the degrees of {name}")
+    row = words.row(f"the name or the degrees of {name}")
+    if not all(map(is_number, row)):  # it is the name, such as "2nd patch"
+        row = words.row(f"the degrees of {name}")
+    degrees = words.as_wholes(_demand(words, row, 3, f"the degrees of {name}"), f"the degrees of {name}")
     counts = _wholes(words, 3, f"the numbers of control points of {name}")
     knots = [
         _reals(words, count + degree + 1, f"the knots of {name} in {axis}")
@@ -82,7 +105,10 @@ def _reals(words: Words, count: int, what: str) -> Array:
 
 def _row(words: Words, count: int, what: str) -> list[str]:
     """Return the next row, which must have `count` words."""
-    row = words.row(what)
+    return _demand(words, words.row(what), count, what)
+
+
+def _demand(words: Words, row: list[str], count: int, what: str) -> list[str]:
     if len(row) != count:
         raise words.fault(f"{what} must be {count} numbers in one row, got {len(row)}")
     return row

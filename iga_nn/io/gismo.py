@@ -14,8 +14,6 @@ from pathlib import Path
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element, SubElement
 
-import numpy as np
-
 from parameterize.arrays import Array
 from parameterize.spline.interface import Face, Interface, axis_side, varying
 from parameterize.spline.multipatch import MultiPatch, as_multipatch
@@ -40,11 +38,14 @@ def read_gismo(text: str) -> tuple[list[BSplineVolume], list[tuple[Face, Face]]]
     """Return the patches, and the pairs of faces that the file declares glued. Raises ValueError with the place."""
     root = _parsed(text)
     geometries = [(_id_of(node, place), node) for place, node in enumerate(root.findall("Geometry"))]
+    if not geometries and (named := root.find("xmlfile")) is not None:
+        raise ValueError(f"holds no Geometry, but names the file {(named.text or '').strip()[:80]}: read that one")
     bodies = [node for node in root.findall("MultiPatch") if node.get("parDim") in (None, "3")]
     if len(bodies) > 1:
         raise ValueError(f"holds {len(bodies)} MultiPatches of volumes: save the one you mean in a file of its own")
     chosen = _named(bodies[0], geometries) if bodies else _volumes(geometries)
     patches = [_read_patch(node, f"Geometry {number}") for number, node in chosen]
+    _tell_left_out(root, [node for _, node in chosen], bodies[:1])
     return patches, list(_declared(bodies[0], [number for number, _ in chosen])) if bodies else []
 
 
@@ -87,15 +88,24 @@ def _named(body: Element, geometries: Geometries) -> Geometries:
 
 
 def _volumes(geometries: Geometries) -> Geometries:
-    """Return the volumes; a notice names the curves and surfaces beside them."""
+    """Return the volumes. Raises ValueError where there is none."""
     found = [(number, node) for number, node in geometries if node.get("type") in VOLUMES]
-    others = sorted({str(node.get("type")) for _, node in geometries} - set(VOLUMES))
     if not found:
+        others = sorted({str(node.get("type")) for _, node in geometries})
         held = f"holds a {others[0]}" if others else "holds no Geometry"
         raise ValueError(f"{held}; a volume is a TensorBSpline3 or a TensorNurbs3")
-    if others:
-        log.warning("only the volumes are taken; left out: %s", ", ".join(others))
     return found
+
+
+def _tell_left_out(root: Element, *taken: Sequence[Element]) -> None:
+    """Tell what a file holds beside the volumes: other geometries by their types, all else by its tags."""
+    names = [
+        str(node.get("type")) if node.tag == "Geometry" else node.tag
+        for node in root
+        if not any(node in nodes for nodes in taken)
+    ]
+    if names:
+        log.warning("only the volumes of the body are taken; left out: %s", ", ".join(sorted(set(names))))
 
 
 def _read_patch(node: Element, name: str) -> BSplineVolume:
@@ -105,6 +115,10 @@ def _read_patch(node: Element, name: str) -> BSplineVolume:
     for basis in node.iter("Basis"):
         if basis.get("type") not in ("TensorBSplineBasis3", "TensorNurbsBasis3", "BSplineBasis"):
             raise ValueError(f"{name} has a basis of type {basis.get('type')}; a volume has a TensorBSplineBasis3")
+    if node.find("transform") is not None:
+        raise ValueError(f"{name} has a transform, which is not applied: move its control points, and remove it")
+    if kind == "TensorNurbs3" and node.find(".//weights") is None:
+        raise ValueError(f"{name} is a TensorNurbs3 without weights")
     rows = list(node.iter("KnotVector"))
     coefficients = node.find("coefs")
     if len(rows) != 3 or coefficients is None or coefficients.get("geoDim") != "3":
@@ -146,17 +160,10 @@ def _wholes(text: str | None, what: str) -> list[int]:
 
 
 def _numbers(node: Element, what: str) -> Array:
-    """Return the numbers of an element (n,), fractions among them."""
+    """Return the numbers of an element (n,)."""
     if node.get("format", "ASCII").upper() != "ASCII":
         raise ValueError(f"{what} have the format {node.get('format')}: save the file with the format ASCII")
-    words = (node.text or "").split()
-    if not any("/" in word for word in words):
-        return finite_numbers(words, what)
-    parts = [word.partition("/") for word in words]
-    below = finite_numbers([denominator if slash else "1" for _, slash, denominator in parts], what)
-    if not np.all(below):
-        raise ValueError(f"{what} must be finite, got a division by zero")
-    return finite_numbers([numerator for numerator, _, _ in parts], what) / below
+    return finite_numbers((node.text or "").split(), what)
 
 
 def write_gismo(path: Path, spline: BSplineVolume | MultiPatch, *_: object) -> None:

@@ -126,7 +126,10 @@ def _read_weights(words: Words, size: int) -> Array:
     if section in ("unitweights", "autoweights"):
         return np.ones(size)
     if section != "weights":
-        raise words.fault(f"weights must follow, got {section[:40]!r}, which is not read")
+        raise words.fault(
+            f"weights must follow, got {section[:40]!r}, which is not read: save the mesh without it, with all its "
+            "elements and both sides of a periodic boundary"
+        )
     return words.reals(size, "weights")
 
 

@@ -1,6 +1,8 @@
 """Tells the kinds of volume files apart by their beginnings, and reads those of other programs."""
 
+import gzip
 import re
+import zlib
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
@@ -10,7 +12,7 @@ from parameterize.spline.volume import BSplineVolume
 
 from . import geopdes, gismo, mfem, splinepy
 from .patches import body_of
-from .words import text_of
+from .words import opened, text_of
 
 HEAD = 4096  # bytes by which a kind is told
 
@@ -26,9 +28,15 @@ ENDINGS = {"gismo": ".xml", "mfem": ".mesh", "geopdes": ".txt", "json": ".json"}
 
 
 def kind_of(path: Path) -> str | None:
-    """Return the kind of a file by its beginning: one of READERS, "npz", or None. Raises OSError."""
-    with path.open("rb") as stream:
-        head = stream.read(HEAD).lstrip(b"\xef\xbb\xbf \t\r\n")
+    """Return the kind of a file by its beginning, also of a packed one: one of READERS, "npz", or None.
+
+    Raises OSError.
+    """
+    try:
+        with opened(path) as stream:
+            head = stream.read(HEAD).lstrip(b"\xef\xbb\xbf \t\r\n")
+    except (EOFError, zlib.error, gzip.BadGzipFile):  # packed, but damaged
+        return None
     if head.startswith(b"<") and re.search(rb"<xml\b", head):
         return "gismo"
     if head.startswith(b"#"):

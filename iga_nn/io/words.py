@@ -1,24 +1,45 @@
 """Reads a text file of numbers word by word, and says at which line something is wrong."""
 
+import gzip
+import zlib
 from collections.abc import Iterator
 from pathlib import Path
+from typing import BinaryIO, cast
 
 import numpy as np
 
 from parameterize.arrays import Array
 
 MAX_BYTES = 128 << 20
+PACKED = b"\x1f\x8b"  # the first bytes of gzip
 
 
 def text_of(path: Path) -> str:
-    """Return the text of a file. Raises OSError, and ValueError where it is too large or not in UTF-8."""
-    size = path.stat().st_size
-    if size > MAX_BYTES:
+    """Return the text of a file, which may be packed by gzip; a text that is not in UTF-8 is taken as Latin-1.
+
+    Numbers and names of formats are the same in both, so that only comments depend on it. Raises OSError, and
+    ValueError where the file is too large, or not whole.
+    """
+    if (size := path.stat().st_size) > MAX_BYTES:
         raise ValueError(f"has {size} bytes, more than {MAX_BYTES}")
+    with opened(path) as stream:
+        try:
+            content = stream.read(MAX_BYTES + 1)
+        except (EOFError, zlib.error, gzip.BadGzipFile) as error:
+            raise ValueError(f"is not a whole .gz file ({error}): save it again") from None
+    if len(content) > MAX_BYTES:
+        raise ValueError(f"has more than {MAX_BYTES} bytes once it is unpacked")
     try:
-        return path.read_text(encoding="utf-8-sig")
+        return content.decode("utf-8-sig")
     except UnicodeDecodeError:
-        raise ValueError("is not a text file in UTF-8") from None
+        return content.decode("latin-1")
+
+
+def opened(path: Path) -> BinaryIO:
+    """Return the bytes of a file as a stream, unpacked where they are packed by gzip. Raises OSError."""
+    with path.open("rb") as stream:
+        is_packed = stream.read(len(PACKED)) == PACKED
+    return cast(BinaryIO, gzip.open(path)) if is_packed else path.open("rb")
 
 
 class Words:
@@ -98,20 +119,30 @@ class Words:
 
 
 def finite_numbers(words: list[str], what: str) -> Array:
-    """Return words as finite numbers (n,). Raises ValueError with the word that is none."""
-    try:
-        values = np.array([float(word) for word in words], dtype=np.float64)
-    except ValueError:
-        bad = next(word for word in words if not _is_number(word))
-        raise ValueError(f"{what} must be numbers, got {bad[:40]!r}") from None
+    """Return words as finite numbers (n,). Raises ValueError with the word that is none.
+
+    Words may be fractions such as 1/3, and have exponents as Fortran and MATLAB write them, 1D+0.
+    """
+    values = np.array([_number(word, what) for word in words], dtype=np.float64)
     if not np.all(np.isfinite(values)):
         raise ValueError(f"{what} must be finite, got {words[int(np.argmin(np.isfinite(values)))][:40]!r}")
     return values
 
 
-def _is_number(word: str) -> bool:
+def _number(word: str, what: str) -> float:
+    if is_number(word):
+        return float(word)
+    above, slash, below = word.upper().replace("D", "E").partition("/")
+    if not (is_number(above) and is_number(below or "1") and bool(slash) == bool(below)):
+        raise ValueError(f"{what} must be numbers, got {word[:40]!r}")
+    divisor = float(below or "1")
+    return float(above) / divisor if divisor else float("inf")
+
+
+def is_number(word: str) -> bool:
+    """Return whether a word is a number with an exponent by E or none; digits are not grouped."""
     try:
         float(word)
     except ValueError:
         return False
-    return True
+    return "_" not in word
