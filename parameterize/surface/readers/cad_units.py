@@ -26,7 +26,7 @@ SAME = 1e-7  # relative: two units are one; the survey foot differs from the foo
 SOLIDS = re.compile(rb"BREP_SHAPE_REPRESENTATION\s*\(\s*(?:'[^']{0,400}+')+\s*,\s*\([^()]*+\)\s*,\s*#(\d{1,18})\s*\)")
 # Those that matter are short, so that a text without an end takes no time.
 ENTITY = re.compile(rb"#(\d{1,18})\s*=\s*((?:[^';#]{1,400}+|#|'[^']{0,400}+'){1,200}+);")
-COMMENT = re.compile(rb"('[^']*+')|/\*.*?\*/", re.DOTALL)
+COMMENT = re.compile(rb"('[^']*+')|/\*.{0,2000}?\*/", re.DOTALL)
 CONTEXT = re.compile(rb"GLOBAL_UNIT_ASSIGNED_CONTEXT\s*\(\s*\(([^()]*)\)")
 METRIC = re.compile(rb"SI_UNIT\s*\(\s*(?:\.(\w+)\.|\$)\s*,\s*\.METRE\.\s*\)")
 CONVERTED = re.compile(rb"CONVERSION_BASED_UNIT\s*\(\s*'([^']{0,80})'\s*,\s*#(\d{1,18})")
