@@ -57,14 +57,17 @@ class _Others:
         raise SystemExit(code)
 
 
-def test_a_process_that_fails_alone_says_why(monkeypatch, capsys):
+@pytest.mark.parametrize(
+    ("fault", "says"), [(MemoryError, "MemoryError"), (KeyboardInterrupt, "interrupted"), (OSError("full"), "full")]
+)
+def test_a_process_that_fails_alone_says_why(fault, says, monkeypatch, capsys):
     for name in ("GRACE", "PRINTING"):
         monkeypatch.setattr(mpi_job, name, 0.0)
     with pytest.raises(SystemExit) as ended, mpi_job.together(_Others()):
-        raise MemoryError
+        raise fault
     logging.disable(logging.NOTSET)
     assert ended.value.code == 2
-    assert capsys.readouterr().err == "iga-nn: process 1 of 2 failed, the job ends: MemoryError\n"
+    assert capsys.readouterr().err == f"iga-nn: process 1 of 2 failed, the job ends: {says}\n"
 
 
 @pytest.mark.parametrize("how", ["raise", pytest.param("die", marks=pytest.mark.slow)])

@@ -43,16 +43,20 @@ def together(comm: Any) -> Iterator[None]:
     arrived, deadline = meeting.Ibarrier(), time.monotonic() + GRACE
     while not arrived.Test():  # others may have long to go: a barrier that waits would keep a core busy
         if fault is not None and time.monotonic() > deadline:
-            words = one_line(fault) or type(fault).__name__
-            sys.stderr.write(f"iga-nn: process {comm.rank} of {comm.size} failed, the job ends: {words}\n")
+            sys.stderr.write(f"iga-nn: process {comm.rank} of {comm.size} failed, the job ends: {_words(fault)}\n")
             sys.stderr.flush()
             time.sleep(PRINTING)
             comm.Abort(FAILED)
         time.sleep(POLL)
-    failed = [str(words) for words in meeting.allgather(fault and (one_line(fault) or type(fault).__name__)) if words]
+    failed = [str(words) for words in meeting.allgather(fault and _words(fault)) if words]
     if failed and comm.rank > 0:
         raise SystemExit(FAILED)
     if fault is not None:
         raise fault
     if failed:
         raise InputError(f"another process failed: {failed[0]}")
+
+
+def _words(fault: BaseException) -> str:
+    """Return in one line why a process failed; an interruption without words of its own came by a signal."""
+    return one_line(fault) or ("interrupted" if isinstance(fault, KeyboardInterrupt) else type(fault).__name__)
