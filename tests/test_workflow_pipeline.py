@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import json
 import os
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -116,14 +117,36 @@ def test_the_checkpoint_stays_until_all_is_solved(formula_training, in_folder, m
     assert not checkpoint.parent.exists()
 
 
+def test_a_map_that_was_changed_is_not_kept(formula_training, in_folder, monkeypatch, caplog):
+    """An interrupted run goes on with the map of its report, and not with a volume of 8 times its size."""
+    formula_training()
+    with monkeypatch.context() as patched:
+        patched.setattr("iga_nn.workflow.solving.solve_with", lambda *_, **__: 1 / 0)
+        with pytest.raises(ZeroDivisionError):
+            iga_nn.run("poisson", "cube", "out", mapping=MapOptions(resume=True))
+    made = iga_nn.load_volume("out/volume.npz")
+    replace(made, control_points=2.0 * made.control_points).save("out/volume.npz")
+    caplog.set_level("INFO")
+    iga_nn.run("poisson", "cube", "out", mapping=MapOptions(resume=True), poisson=PoissonOptions(refine=(0,)))
+    assert np.array_equal(iga_nn.load_volume("out/volume.npz").control_points, made.control_points)
+    assert "volume.npz is not that of the report: the map is made anew" in caplog.text
+
+
 def test_a_finished_result_without_its_files_is_no_answer(formula_training, in_folder):
     formula_training()
     pipeline.parameterize_to("cube", "out")
     with pytest.raises(InputError, match="leave --vector out"):
         pipeline.parameterize_to("cube", "out", mapping=MapOptions(resume=True), vector=True)
-    Path("out/volume.npz").unlink()
-    with pytest.raises(InputError, match="volume.npz is gone"):
+    whole = Path("out/volume.npz").read_bytes()
+    Path("out/volume.npz").write_bytes(whole[:-100])
+    with pytest.raises(InputError, match="volume.npz has changed since this finished result; --force makes it anew"):
         pipeline.parameterize_to("cube", "out", mapping=MapOptions(resume=True))
+    Path("out/volume.npz").write_bytes(whole)
+    pipeline.parameterize_to("cube", "out", mapping=MapOptions(resume=True))
+    for name in ("boundary.npz", "volume.npz"):
+        Path("out", name).unlink()
+        with pytest.raises(InputError, match=f"{name} is gone"):
+            pipeline.parameterize_to("cube", "out", mapping=MapOptions(resume=True))
 
 
 def test_a_hidden_file_has_a_folder_of_its_own():

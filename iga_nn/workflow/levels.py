@@ -1,6 +1,5 @@
 """Holds the levels that a problem was solved on so far, and keeps them for a run that goes on with the next one."""
 
-import hashlib
 import logging
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass, field
@@ -19,6 +18,7 @@ from solve.solution import MultiPatchSolution, Solution
 from ..figures.evaluate import Body, problems_on
 from ..options import ProblemOptions
 from ..report import document as reports
+from .output_folder import digest
 
 log = logging.getLogger(__name__)
 
@@ -77,7 +77,7 @@ class KeptLevels:
         """Keep the levels whose finest solution the output folder holds."""
         state = {"asked": self._asked, "refine": done.refine, "entries": reports.plain(done.entries)}
         state |= {"reports": [reports.plain(asdict(report)) for report in done.reports]}
-        state |= {"solution": _digest(self.folder / SOLUTION)}
+        state |= {"solution": digest(self.folder / SOLUTION)}
         self.checkpoints.save(_CHECKPOINT, {}, state)
 
     def load(self, body: Body, problem: BoundaryValueProblem) -> Levels:
@@ -93,7 +93,7 @@ class KeptLevels:
         if state["asked"] != self._asked or refine != sorted(self.statement.refine)[: len(refine)]:
             log.info("the levels that are done are those of another problem: all are solved anew")
             return Levels()
-        if state["solution"] != _digest(self.folder / SOLUTION):
+        if state["solution"] != digest(self.folder / SOLUTION):
             log.info("%s is not the solution of the last level: all are solved anew", self.folder / SOLUTION)
             return Levels()
         found = [_report(values) for values in state["reports"]]
@@ -105,11 +105,6 @@ class KeptLevels:
 
 def _listed(levels: Iterable[int]) -> str:
     return ", ".join(map(str, levels))
-
-
-def _digest(path: Path) -> str:
-    """Return the SHA-256 of a file; "" where there is none."""
-    return hashlib.sha256(path.read_bytes()).hexdigest() if path.is_file() else ""
 
 
 def _report(values: dict[str, Any]) -> SolveReport:

@@ -36,7 +36,7 @@ from ..report.artifacts import SOLVED
 from ..report.patches import unproved_places, with_unproved
 from ..rounding import rounded
 from .cost_estimate import Forecast, forecast, warn_of_memory
-from .output_folder import CHECKPOINT, RunFolder, has_checkpoint
+from .output_folder import CHECKPOINT, RunFolder, changed_file, digest, has_checkpoint
 from .regions import check_regions, frame_of
 from .verdict import tell
 
@@ -131,7 +131,10 @@ def kept_map(
     arguments are those of `map_surface`.
     """
     report = reports.read(state.folder)
-    if report is None or not _is_of_map(report, given) or not all((state.folder / name).is_file() for name in _OF_MAP):
+    if report is None or not _is_of_map(report, given):
+        return None
+    if name := changed_file(state.folder, report, _OF_MAP):
+        log.info("%s is not that of the report: the map is made anew", state.folder / name)
         return None
     if problem is not None:
         _check_data(problem, given.surface)
@@ -318,6 +321,7 @@ def _write(
         input=given.surface.summary() | {"notices": _notices(given.surface)},
         config=asdict(result.config),
         estimate=asdict(expected),
+        files={name: digest(state.folder / name) for name in _OF_MAP},
         seed=mapping.seed,
         device=result.device,
         versions=reports.versions(),

@@ -1,9 +1,10 @@
 """Holds one output folder for one run: its report so far, and the clock."""
 
+import hashlib
 import os
 import shutil
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, ExitStack, contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -242,6 +243,22 @@ def _last_kept(folder: Path) -> str:
     """Return in words what the last checkpoint in the folder holds."""
     last = max((folder / CHECKPOINT).glob("*.safetensors"), key=lambda path: path.stat().st_mtime_ns)
     return KEPT.get(last.name.split(".")[0].split("-")[0], "the checkpoint")
+
+
+def digest(path: Path) -> str:
+    """Return the SHA-256 of a file; "" where there is none."""
+    return hashlib.sha256(path.read_bytes()).hexdigest() if path.is_file() else ""
+
+
+def changed_file(folder: Path, report: reports.Report, names: Sequence[str]) -> str:
+    """Return the first of some files that is not there, or has changed since the report was written; "" for none.
+
+    The report has the digests of the files of a map; of one without them, only files that are gone are told.
+    """
+    known = report.get("files")
+    known = known if isinstance(known, dict) else {}
+    found = {name: digest(folder / name) for name in names}
+    return next((name for name in names if not found[name] or found[name] != known.get(name, found[name])), "")
 
 
 def has_checkpoint(folder: Path) -> bool:

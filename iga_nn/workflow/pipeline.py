@@ -47,7 +47,7 @@ from .command_line import command_line
 from .cost_estimate import tell_memory
 from .levels import Found, KeptLevels
 from .mapping import MapInput, kept_map, map_surface, read_input
-from .output_folder import CHECKPOINT, Outcome, RunFolder, default_folder, open_folder
+from .output_folder import CHECKPOINT, Outcome, RunFolder, changed_file, default_folder, open_folder
 from .painter import Painter
 from .solving import (
     described,
@@ -199,7 +199,7 @@ def finished_run(
 ) -> Outcome | None:
     """Return the finished result of `parameterize_to` in its folder, None where there is none.
 
-    Raises InputError where another run made the result, or where some of its files are missing.
+    Raises InputError where another run made the result, or where some of its files are missing or were changed.
     """
     report = reports.read(Path(out))
     if report is None or not reports.is_finished(report):
@@ -371,7 +371,7 @@ def _finished_by(
 ) -> Outcome:
     """Return the finished result that a resumed run of this identity finds.
 
-    Raises InputError where another run made the result, or where some of its files are missing.
+    Raises InputError where another run made the result, or where some of its files are missing or were changed.
     """
     folder, made_by, known = finished.folder, finished.report.get("command", ""), finished.report.get("identity")
     unfit = reports.why_not_solved(finished.report)
@@ -383,9 +383,10 @@ def _finished_by(
         why = ", whose report has no identity" if known is None else f" (different: {', '.join(names)})"
         remedy = "--force replaces it, --out names another folder"
         raise InputError(f"{folder}: holds the result of `{made_by}`{why}; {remedy}")
-    wanted = ["volume.npz"] + ["solution.npz"] * bool(reports.solved(finished.report))
-    if gone := [name for name in wanted if not (folder / name).is_file()]:
-        raise InputError(f"{folder}: {gone[0]} is gone from this finished result; --force makes it anew")
+    wanted = ["volume.npz", "boundary.npz"] + ["solution.npz"] * bool(reports.solved(finished.report))
+    if name := changed_file(folder, finished.report, wanted):
+        what = "has changed since" if (folder / name).exists() else "is gone from"
+        raise InputError(f"{folder}: {name} {what} this finished result; --force makes it anew")
     if vector and not (folder / "history.pdf").is_file():
         raise InputError(f"{folder}: is finished, without PDFs; leave --vector out, or make it anew with --force")
     log.info("%s: finished already", folder)
