@@ -1,6 +1,5 @@
 """Tells the kinds of volume files apart by their beginnings, and reads those of other programs."""
 
-import gzip
 import re
 import zlib
 from collections.abc import Callable, Iterable, Sequence
@@ -12,7 +11,7 @@ from parameterize.spline.volume import BSplineVolume
 
 from . import geopdes, gismo, mfem, splinepy
 from .patches import body_of
-from .words import opened, text_of
+from .words import PACKED, text_of
 
 HEAD = 4096  # bytes by which a kind is told
 
@@ -32,17 +31,25 @@ def kind_of(path: Path) -> str | None:
 
     Raises OSError.
     """
-    try:
-        with opened(path) as stream:
-            head = stream.read(HEAD).lstrip(b"\xef\xbb\xbf \t\r\n")
-    except (EOFError, zlib.error, gzip.BadGzipFile):  # packed, but damaged
-        return None
+    with path.open("rb") as stream:
+        head = stream.read(HEAD)
+    if head.startswith(PACKED):
+        head = _unpacked(head)
+    head = head.lstrip(b"\xef\xbb\xbf \t\r\n")
     if head.startswith(b"<") and re.search(rb"<xml\b", head):
         return "gismo"
     if head.startswith(b"#"):
         return "geopdes" if geopdes.HEADER.search(head.decode(errors="replace")) else None
     marks = {b"MFEM NURBS": "mfem", b"{": "json", b"PK": "npz"}
     return next((kind for mark, kind in marks.items() if head.startswith(mark)), None)
+
+
+def _unpacked(packed: bytes) -> bytes:
+    """Return the beginning of what is packed by gzip in the beginning of a file; b"" for what is damaged."""
+    try:
+        return zlib.decompressobj(wbits=zlib.MAX_WBITS | 16).decompress(packed, HEAD)
+    except zlib.error:
+        return b""
 
 
 def read_body(path: Path, kind: str, tolerance: float) -> BSplineVolume | MultiPatch:

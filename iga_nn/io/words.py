@@ -22,11 +22,11 @@ def text_of(path: Path) -> str:
     """
     if (size := path.stat().st_size) > MAX_BYTES:
         raise ValueError(f"has {size} bytes, more than {MAX_BYTES}")
-    with opened(path) as stream:
-        try:
+    try:
+        with _opened(path) as stream:
             content = stream.read(MAX_BYTES + 1)
-        except (EOFError, zlib.error, gzip.BadGzipFile) as error:
-            raise ValueError(f"is not a whole .gz file ({error}): save it again") from None
+    except (EOFError, zlib.error, gzip.BadGzipFile) as error:
+        raise ValueError(f"is not a whole .gz file ({error}): save it again") from None
     if len(content) > MAX_BYTES:
         raise ValueError(f"has more than {MAX_BYTES} bytes once it is unpacked")
     try:
@@ -35,7 +35,7 @@ def text_of(path: Path) -> str:
         return content.decode("latin-1")
 
 
-def opened(path: Path) -> BinaryIO:
+def _opened(path: Path) -> BinaryIO:
     """Return the bytes of a file as a stream, unpacked where they are packed by gzip. Raises OSError."""
     with path.open("rb") as stream:
         is_packed = stream.read(len(PACKED)) == PACKED
