@@ -97,7 +97,8 @@ def test_where_no_blocks_fit_a_body_without_handles_one_cube_is_tried():
     task = Mock(seconds={})
     type(task).layout = PropertyMock(side_effect=LayoutError("too thin"))
     task.surface.genus, task.config.blocks = 0, None
-    assert BLOCKS.make(task, None) is None
+    nothing = Mock(load=Mock(return_value=None))
+    assert BLOCKS.make(task, nothing) is None
     assert Tried(BLOCKS, None, {}).report().ending == "no blocks fit"
     assert next_start((Tried(BLOCKS, None, {}),), (BLOCKS, *STARTS)) is NETWORK
     assert next_start((tried(BLOCKS),), (BLOCKS, *STARTS)) is None
@@ -106,7 +107,7 @@ def test_where_no_blocks_fit_a_body_without_handles_one_cube_is_tried():
     assert next_start((tried(BLOCKS, distance=FAR),), (BLOCKS,)) is None
     task.config.blocks = 9
     with pytest.raises(LayoutError, match="too thin"):
-        BLOCKS.make(task, None)
+        BLOCKS.make(task, nothing)
 
 
 def test_one_cube_is_refused_for_a_body_with_handles():

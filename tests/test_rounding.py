@@ -52,7 +52,7 @@ def test_little_free_memory_is_said(monkeypatch, caplog):
 
 
 def test_the_last_moment_is_no_zero_seconds():
-    assert "about 0:01 left" in describe(Progress("spline", 1, 3, 0.5, 0, 0.2))
+    assert "0:01 of the training left" in describe(Progress("cube", 1, 3, 0.5, 0, 0.2))
 
 
 def test_a_share_that_has_begun_is_no_zero_percent():

@@ -55,8 +55,12 @@ ACCEPTED = {
     ),
     "animated.glb": (glb(gltf(animations=[{}])), "left out 1 animations: the scene is read at rest"),
     "model.3mf": (threemf(model(build='<item objectid="1"/>', unit="meter")), None),
-    "parts.3mf": (threemf_files.archive(threemf_files.PIECES), "left out 1 objects of type support"),
-    "unnamed.3mf": (threemf_files.archive({"3D/a.model": threemf_files.model()}), "read its only model, '3D/a.model'"),
+    "unnamed.3mf": (
+        threemf_files.archive(
+            {"3D/a.model": threemf_files.model(threemf_files.thing(1, threemf_files.mesh((1, 1, 1))))}
+        ),
+        "read its only model, '3D/a.model'",
+    ),
     "packed.zip": (
         zipped({"parts/cube.obj": obj(), "__MACOSX/._cube.obj": "x", "readme.txt": "a cube"}),
         "unpacked 'parts/cube.obj' from .zip",
