@@ -84,6 +84,7 @@ def test_a_fold_is_named_by_its_patch_and_place():
     assert np.linalg.det(body.patches[2].jacobian([found.patches[2].witness])[0]) < 0.0
 
 
+@pytest.mark.exact
 def test_what_is_not_proved_is_named_by_patch():
     """dz/dw of the second patch touches zero at w = 1/2."""
     heights = np.array([0.0, 1.0, 0.0, 1.0]) / 3.0

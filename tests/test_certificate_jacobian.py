@@ -93,6 +93,7 @@ def test_affine_map_far_from_the_origin(degree):
     assert certificate.lower_bound == pytest.approx(1.0, abs=1e-9)
 
 
+@pytest.mark.exact
 @pytest.mark.parametrize("factor", [1e-100, 1e-30, 1e30, 1e100])
 def test_verdict_does_not_depend_on_units(factor):
     volume = bump(0.9)
@@ -219,6 +220,7 @@ def test_bad_arguments():
         )
 
 
+@pytest.mark.exact
 @pytest.mark.filterwarnings("error")
 def test_the_largest_coordinates_stay_within_double_precision():
     knots = (open_uniform_knots(6, 3),) * 3

@@ -74,7 +74,7 @@ def distance(found, fit):
 @pytest.fixture(scope="module")
 def once(first, tmp_path_factory):
     """What one refinement makes of it, the options of that, and the folder of its checkpoints."""
-    options, folder = {"tolerance": 0.9 * distance(*first)}, tmp_path_factory.mktemp("refined")
+    options, folder = {"tolerance": 0.95 * distance(*first)}, tmp_path_factory.mktemp("refined")
     return refined(first, Checkpoints(folder, {}, resume=False), **options), options, folder
 
 

@@ -190,6 +190,7 @@ def test_a_smooth_function_is_met_with_the_order_of_the_degree():
     assert errors[0] / errors[1] > 2.0**3.5  # spans of 1/8 and 1/16
 
 
+@pytest.mark.exact
 @pytest.mark.parametrize("control_points", [4, 5, 8, (5, 8, 13), 40])
 @pytest.mark.parametrize("ends", [(0.1, 1.0), (-0.3, 0.7), (1e6 + 0.1, 1e6 + 1.3)])
 def test_plane_faces_of_a_function_stay_in_their_planes_to_the_last_bit(control_points, ends):

@@ -214,6 +214,7 @@ run_and_exit()
 """
 
 
+@pytest.mark.exact
 @pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
 @pytest.mark.parametrize(("name", "code"), [("SIGINT", 130), ("SIGKILL", -signal.SIGKILL)])
 def test_a_real_signal_in_a_level(name, code, in_folder, few_distances, ending):
