@@ -1,4 +1,4 @@
-"""The kinds of arrays that most functions take and return, and how a point is written."""
+"""The kinds of arrays that most functions take and return, and how a point and a share are written."""
 
 from collections.abc import Iterable
 from typing import Any
@@ -16,3 +16,8 @@ Knots = tuple[Array, Array, Array]  # the knot vectors of u, v, w
 def in_brackets(point: Iterable[float]) -> str:
     """Return the three coordinates of a point as text: "(0.25, 1, -3.5e-07)"."""
     return "({:.6g}, {:.6g}, {:.6g})".format(*point)
+
+
+def in_percent(share: float) -> str:
+    """Return a share as text, in two digits: "2.4 %"; in whole per cent where it is more than the whole."""
+    return f"{100.0 * share:.2g} %" if share < 1.0 else f"{100.0 * share:.0f} %"

@@ -230,7 +230,7 @@ def bending_notices(patches: Sequence[PatchProblem]) -> Iterator[str]:
         where = f" of patch {prefix[:-1]}" if prefix else ""
         yield (
             f"spans{where} are {share:.2g} times as long as the body is thick there: with degree {degree} it may bend "
-            "some 2 to 40 % too little; raise --refine or --degree until its displacement stays"
+            "some 2 to 40 % too little, and swing too fast; raise --refine or --degree until its numbers stay"
         )
 
 

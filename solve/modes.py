@@ -16,7 +16,7 @@ from parameterize.spline.multipatch import MultiPatch
 from parameterize.spline.volume import BSplineVolume
 from parameterize.threads import one_blas_thread
 
-from .diagnostics import ConvergenceError
+from .diagnostics import ConvergenceError, bending_notices
 from .field import MultiPatchField, arrays_of
 from .forms.boundary_value_problem import BoundaryValueProblem
 from .linear.direct import factorized, price_of, sparse
@@ -173,7 +173,7 @@ def modes(
     pencil = Pencil(by_columns(system.operator.matvec), mass, _inverse(system), of_unit_mass(motions, mass))
     with one_blas_thread():
         found = pencil.lowest(n, tolerance, max_iterations)
-    notices = _notices(found)
+    notices = (*_notices(found), *bending_notices(system.patches))
     if found.worst > tolerance:
         remedy = "raise max_iterations or the tolerance, or ask for some more modes where several lie close together"
         raise ConvergenceError(

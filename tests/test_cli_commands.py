@@ -61,7 +61,7 @@ def test_run_poisson_writes_the_whole_folder(formula_training, in_folder, capsys
     assert not [file for file in folder.iterdir() if file.name.startswith(".")]  # no temporary file left
     report = json.loads((folder / "report.json").read_text())
     assert list(report) == [
-        "schema", "command", "identity", "input", "config", "estimate", "seed", "device", "versions",
+        "schema", "command", "identity", "input", "config", "estimate", "files", "seed", "device", "versions",
         "parameterization", "poisson", "seconds",
     ]  # fmt: skip
     described = (Path(iga_nn.__file__).resolve().parents[1] / "docs" / "output.md").read_text(encoding="utf-8")
@@ -104,7 +104,7 @@ def test_a_folded_map_is_solved_if_asked_alone_with_a_warning_and_exit_code_3(fo
     formula_training(amplitude=0.35)
     assert main(["run", "poisson", "cube", "--refine", "0"]) == 3
     out, err = capsys.readouterr()
-    assert out.startswith("NOT SOLVED       the map folds; --solve-anyway solves on it all the same\n")
+    assert out.startswith("NOT SOLVED       the map folds; --solve-anyway --force solves on it all the same\n")
     assert err.count("nothing is solved: the map folds") == 1 and not Path("cube/solution.npz").exists()
     assert main(["run", "poisson", "cube", "--refine", "0", "--resume"]) == 3  # finished so
     assert main(["run", "poisson", "cube", "--refine", "0", "--solve-anyway", "--force"]) == 3

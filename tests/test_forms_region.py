@@ -102,6 +102,7 @@ def test_faces_alone_are_known_as_faces():
         ("box(1, 2)", r"write box\(x0, y0, z0, x1, y1, z1\)"),
         ("face(1, 2)", r"write face\(x, y, z\)"),
         ("face(a, b, c)", r"write face\(x, y, z\)"),
+        ("face(1, 2, 3, -5)", "an angle is from 0 to 180"),
         ("__import__('os') < 1", "not a known function"),
         (3.0, "must be text"),
     ],

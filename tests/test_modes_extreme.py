@@ -34,7 +34,7 @@ def test_thin_foils_have_the_modes_of_a_thicker_one(turn):
     law = Elasticity(young=1.0, poisson_ratio=0.3, **FREE)
     for thickness in (1e-3, 5e-5):
         found = iga_nn.modes(slab(1.0, 1.0, thickness, (5, 5, 4), turn=turn), law, n=4)
-        assert found.rigid == 6 and found.notices == ()
+        assert found.rigid == 6 and all("spans" in one for one in found.notices)
         assert found.frequencies / thickness == pytest.approx([0.658, 1.081, 1.473, 1.889], rel=1e-3)
 
 

@@ -146,9 +146,9 @@ def test_the_report_says_so_too(tmp_path):
     bent.save(tmp_path / "bent.npz")
     options = ModesOptions(number=1, degree=1)
     outcome, _ = pipeline.modes_to(tmp_path / "bent.npz", tmp_path / "modes", modes_options=options)
-    (notice,) = outcome.report["modes"]["notices"]
-    assert "refine until the frequencies stay" in notice
-    assert verdict(outcome.report, outcome.folder)["modes"]["notices"] == [notice]
+    notice, spans = outcome.report["modes"]["notices"]
+    assert "refine until the frequencies stay" in notice and "times as long as the body is thick" in spans
+    assert verdict(outcome.report, outcome.folder)["modes"]["notices"] == [notice, spans]
     assert notice in (tmp_path / "modes" / "report.html").read_text()
 
 

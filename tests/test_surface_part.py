@@ -130,3 +130,7 @@ def test_a_surface_has_its_part():
     assert surface.part.group("lid").tolist() == [2, 3] and surface.part is surface.part
     ends = sample("cube").part.flood(0)
     assert sample("cube").part.area(ends) == pytest.approx(1.0)
+
+
+def test_an_edge_that_bends_by_just_the_angle_is_crossed():
+    assert len(cube().flood(0, 0.0)) == 2 and len(cube().flood(0, 90.0)) == 12 and len(cube().flood(0, 89.9)) == 2

@@ -38,7 +38,7 @@ def at(quality, distance=0.0, volume=1.0):
         (0.0, 0.981, []),
         (0.057, 1.0, ["its boundary is up to 5.7 % of the diagonal from the surface"]),
         (0.001, 0.55, ["its volume is 45 % less than the part's"]),
-        (0.7, 1.5, ["its boundary is up to 70 % of the diagonal", "its volume is 50 % more"]),
+        (0.7, 2.2, ["its boundary is up to 70 % of the diagonal", "its volume is 120 % more"]),
         (float("nan"), float("nan"), ["its boundary is up to nan %", "its volume is nan %"]),
     ],
 )
@@ -69,7 +69,11 @@ def test_a_map_that_is_not_the_part_says_so_first_and_is_solved_if_asked(formula
     assert page.index("This is not the part") < page.index("folded") and "The problem was not solved" in page
     assert not Path("cube/solution.npz").exists() and report["advice"]
 
-    assert main(["solve", "poisson", "cube/volume.npz", "--refine", "0", "--out", "s"]) == 5  # the same, from the run
+    assert main(["check", "cube/volume.npz"]) == 5  # the same, from the report of the run
+    assert capsys.readouterr().out.startswith("NOT THE PART")
+    assert main(["solve", "poisson", "cube/volume.npz", "--refine", "0", "--out", "s", "--json"]) == 5
+    assert list(json.loads(capsys.readouterr().out))[1:3] == ["not_the_part", "not_solved"]
+    assert main(["solve", "poisson", "cube/volume.npz", "--refine", "0", "--out", "s", "--force"]) == 5
     assert capsys.readouterr().out.startswith("NOT THE PART")
     assert main(["solve", "poisson", "cube/volume.npz", "--refine", "0", "--out", "t", "--solve-anyway"]) == 5
     report = json.loads(Path("t/report.json").read_text())
@@ -91,7 +95,7 @@ def test_nothing_is_solved_on_a_folded_volume_unless_asked(in_folder, capsys, co
     words, rest = command[: 1 + (command[0] == "solve")], command[1 + (command[0] == "solve") :]
     assert main([*words, "volume.npz", *rest, "--out", "out"]) == 3
     report = json.loads(Path("out/report.json").read_text())
-    assert report["not_solved"] == "the map folds; --solve-anyway solves on it all the same"
+    assert report["not_solved"] == "the map folds; --solve-anyway --force solves on it all the same"
     assert capsys.readouterr().out.startswith("NOT SOLVED       the map folds")
     assert main([*words, "volume.npz", *rest, "--out", "out", "--force", "--solve-anyway"]) == 3
     report = json.loads(Path("out/report.json").read_text())

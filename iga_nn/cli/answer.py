@@ -75,9 +75,11 @@ def _level(level: dict[str, Any]) -> str:
 
 def volume_in_words(facts: reports.Report) -> str:
     """Return the facts of `check` about a volume as text, the verdicts first."""
-    others = {key: value for key, value in facts.items() if key not in ("bijective", "boundary_injective", "patches")}
+    known = ("bijective", "boundary_injective", "patches", "not_the_part", "surface_distance", "volume")
+    others = {key: value for key, value in facts.items() if key not in known}
     report = {"parameterization": facts}
-    proved = {reports.claim(report): facts["bijective"], "one-to-one": reports.one_to_one(report)}
+    proved = {"NOT THE PART": far} if (far := reports.not_the_part(report)) else {}
+    proved |= {reports.claim(report): facts["bijective"], "one-to-one": reports.one_to_one(report)}
     parts = [f"{f'p{number}:':16s} {_patch(part)}" for number, part in enumerate(facts.get("patches", ()))]
     return "\n".join([*(f"{name:16s} {text}" for name, text in proved.items()), facts_in_words(others), *parts])
 

@@ -26,7 +26,7 @@ from ..options import (
     WorkerOptions,
 )
 from ..version import __version__
-from . import BAD_INPUT, DONE, INTERRUPTED, NOT_CERTIFIED, NOT_SOLVED
+from . import BAD_INPUT, DONE, INTERRUPTED, NOT_SOLVED
 from .arguments import Json, Mesh, Mpi, ObjFile, OutputOptions, Overwrite, PageOptions, Volume, converted, with_values
 from .progress import shown_batch, shown_progress
 from .refusal import refusal
@@ -263,7 +263,7 @@ def check(
     from ..io.formats import is_volume, load_volume
     from ..models import resolve
     from ..report import document as reports
-    from ..workflow.verdict import certified_facts
+    from ..workflow.verdict import facts_of_file
     from . import answer
 
     if not is_volume(path):
@@ -280,9 +280,9 @@ def check(
     if surface != SurfaceOptions() or strict or region or picture:
         options = "--component, --close, --deflection, --max-faces, --decimate, --sharp, --strict, --region"
         raise InputError(f"{path}: is a volume; {options} and --picture are for surfaces")
-    facts = certified_facts(load_volume(path))
+    facts = facts_of_file(Path(path), load_volume(path))
     _print(reports.as_json(facts) if as_json else answer.volume_in_words(facts))
-    return DONE if reports.is_certified({"parameterization": facts}) else NOT_CERTIFIED
+    return answer.exit_code({"parameterization": facts})
 
 
 @app.command(name="sample")

@@ -62,10 +62,10 @@ def what_to_try(report: Report, mapping: MapOptions | None = None) -> list[str]:
     remedies += _of_the_surface(report)
     is_limit = quality.get("refinement", {}).get("stopped") == "limit reached"
     remedies += _more_control_points(max(quality["control_points"]), "max-" * is_limit)
-    if mapping is None or mapping.corners is None:
-        remedies.append("your own corners, away from those places: --corners FILE")
-    else:
-        remedies.append("other corners, farther apart and away from those places: --corners FILE")
+    if not is_certified(report):  # there are places
+        is_first = mapping is None or mapping.corners is None
+        corners = "your own corners," if is_first else "other corners, farther apart and"
+        remedies.append(f"{corners} away from those places: --corners FILE")
     remedies.append(f"another seed: --seed {mapping.seed + 1 if mapping else 1}")
     return remedies
 

@@ -11,6 +11,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from parameterize.arrays import in_percent
 from parameterize.certificate.jacobian import CLAIMS
 from parameterize.files import save_text
 
@@ -19,8 +20,8 @@ from ..version import __version__
 from .artifacts import REPORT, SOLVED
 
 SCHEMA = 1
-SAME_VOLUME = 1e-9  # per cent: rounding
-DEFECTS = ("not_the_part", "unproved", "boundary_meeting", "misglued", "overlap")  # of the section `parameterization`
+SAME_VOLUME = 1e-11  # rounding
+DEFECTS = ("unproved", "boundary_meeting", "misglued", "overlap")  # of the section `parameterization`
 
 Report = dict[str, Any]
 
@@ -156,8 +157,8 @@ def volume_in_words(report: Report) -> tuple[str, ...]:
     """Return the spline's volume, and how far it is from the mesh's; nothing of a report without them."""
     if not (volume := report["parameterization"].get("volume")):
         return ()
-    percent, sense = 100.0 * abs(volume["difference"]), "less" if volume["difference"] < 0.0 else "more"
-    beside = f"{percent:.2g} % {sense} than the mesh's" if percent > SAME_VOLUME else "as the mesh's"
+    share, sense = abs(volume["difference"]), "less" if volume["difference"] < 0.0 else "more"
+    beside = f"{in_percent(share)} {sense} than the mesh's" if share > SAME_VOLUME else "as the mesh's"
     return f"{volume['spline']:.6g}", beside
 
 
@@ -196,7 +197,10 @@ def surface_distance(report: Report) -> Report:
 def verdict(report: Report, folder: Path) -> Report:
     """Return the entries that decide whether a result can be used, as `--json` prints them."""
     quality = report["parameterization"]
-    short: Report = {"folder": str(folder), "bijective": quality["bijective"]}
+    short: Report = {"folder": str(folder)}
+    short |= {"not_the_part": quality["not_the_part"]} if quality.get("not_the_part") else {}
+    short |= {"not_solved": report["not_solved"]} if "not_solved" in report else {}
+    short["bijective"] = quality["bijective"]
     short |= {"orientation": quality["orientation"]} if "orientation" in quality else {}
     short |= {"boundary_injective": quality.get("boundary_injective"), "one_to_one": one_to_one(report)}
     if "arap" in quality:

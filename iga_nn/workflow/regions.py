@@ -51,7 +51,7 @@ def placed_on(texts: Sequence[str], surface: Surface) -> list[Region]:
     Raises ExpressionError for a text that is refused, ValueError for a face of the cube, which a surface does not have.
     """
     regions = [Region(text).placed(frame_of(surface), surface.part) for text in texts]
-    if cube := next((region for region in regions if region.needs_cube), None):
+    if cube := next((region for region in regions if region.needs_cube or region.patch_faces), None):
         raise ValueError(f"region {str(cube)!r:.80}: has faces of the cube, which are known once the part is mapped")
     return regions
 

@@ -146,7 +146,7 @@ def reported(
         yield
     except (InputError, ConvergenceError, KeyboardInterrupt) as error:
         if isinstance(error, KeyboardInterrupt):
-            log.warning("interrupted: what is done is written; once more leaves that out")
+            log.warning("interrupted: what is done is written; interrupt again to stop at once")
         said = one_line(error) or "interrupted"
         state.write(not_solved=f"{said}; {rest}" if (rest := missing()) else said)
         scene = scene_of(state, body, *show())

@@ -36,8 +36,7 @@ def certified_facts(body: BSplineVolume | MultiPatch) -> dict[str, Any]:
 def write_certificate(state: RunFolder, path: Path, body: BSplineVolume | MultiPatch, command: str) -> None:
     """Certify a saved body, and write the sections of report.json about the input and the proof."""
     with state.timed("certify"):
-        facts = certified_facts(body)
-        facts |= _measured_beside(path, facts)
+        facts = facts_of_file(path, body)
     state.write(
         command=command,
         input={"file": str(path), "sha256": hashlib.sha256(path.read_bytes()).hexdigest()},
@@ -45,6 +44,12 @@ def write_certificate(state: RunFolder, path: Path, body: BSplineVolume | MultiP
         parameterization=facts,
     )
     tell(state)
+
+
+def facts_of_file(path: Path, body: BSplineVolume | MultiPatch) -> dict[str, Any]:
+    """Certify a saved body; return the section `parameterization`, with how far it is from the surface of its run."""
+    facts = certified_facts(body)
+    return facts | _measured_beside(path, facts)
 
 
 def _measured_beside(path: Path, facts: dict[str, Any]) -> dict[str, Any]:
@@ -64,7 +69,7 @@ def stays_unsolved(state: RunFolder, anyway: bool) -> bool:
     reason = reports.why_not_solved(state.report)
     if anyway or not reason:
         return False
-    state.write(not_solved=f"{reason}; --solve-anyway solves on it all the same")
+    state.write(not_solved=f"{reason}; --solve-anyway --force solves on it all the same")
     log.warning("nothing is solved: %s", state.report["not_solved"])
     return True
 

@@ -8,7 +8,7 @@ from typing import Any, Generic, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays import Array, IntArray, in_brackets
+from ..arrays import Array, IntArray, in_brackets, in_percent
 from ..certificate.body import BodyCertificate
 from ..certificate.boundary import BoundaryCheck
 from ..certificate.jacobian import Certificate
@@ -177,9 +177,9 @@ class QualityReport(Shown):
         farthest, off = self.relative_distance.max, self.volumes.difference
         reasons = []
         if not farthest <= FARTHEST:
-            reasons.append(f"its boundary is up to {100.0 * farthest:.2g} % of the diagonal from the surface")
+            reasons.append(f"its boundary is up to {in_percent(farthest)} of the diagonal from the surface")
         if not abs(off) <= MOST_VOLUME:
-            reasons.append(f"its volume is {100.0 * abs(off):.2g} % {'less' if off < 0.0 else 'more'} than the part's")
+            reasons.append(f"its volume is {in_percent(abs(off))} {'less' if off < 0.0 else 'more'} than the part's")
         return tuple(reasons)
 
     def __str__(self) -> str:

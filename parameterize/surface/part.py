@@ -19,6 +19,7 @@ THIN = 1e-6  # of the box's diagonal: the normal of a lower triangle is rounding
 TIED = 1e-9  # of the box's diagonal: the same where no normal is given, which could prefer a farther one
 AGREES = 1e-6  # a triangle is preferred where its cosine is larger by more than this
 SHARP = 30.0  # degrees
+ROUNDING = 1e-12  # of a cosine: an edge that bends by just the angle is crossed
 # A triangle whose cosine with a point's normal is less than ASIDE belongs to another face of the part, if one that
 # agrees better lies within FAR, a share of the box's diagonal: a round wall is off the flat triangles of a coarse mesh.
 ASIDE, FAR = 0.5, 0.05
@@ -112,7 +113,7 @@ class PartSurface(Brief):
         return np.where(fine & (np.sum(self.normals[found] * normals, axis=1) >= ASIDE), found, best)
 
     def flood(self, triangle: int, angle: float = SHARP) -> IntArray:
-        """Return the triangles (k,), ascending, reached from one across edges that bend by less than `angle` degrees.
+        """Return the triangles (k,), ascending, reached from one across edges that bend by at most `angle` degrees.
 
         Raises ValueError where there is no such triangle.
         """
@@ -121,7 +122,7 @@ class PartSurface(Brief):
         sides = self._neighbours
         first, side = np.nonzero(sides >= 0)
         second = sides[first, side]
-        smooth = np.sum(self.normals[first] * self.normals[second], axis=1) > np.cos(np.radians(angle))
+        smooth = np.sum(self.normals[first] * self.normals[second], axis=1) >= np.cos(np.radians(angle)) - ROUNDING
         label = connected(np.stack([first[smooth], second[smooth]], axis=1), len(self.faces))
         return np.flatnonzero(label == label[triangle])
 

@@ -264,11 +264,13 @@ def _check_mark(entry: str) -> None:
         return
     counts = {"box": ((6,), "box(x0, y0, z0, x1, y1, z1)"), "face": ((3, 4), "face(x, y, z)")}[kind]
     try:
-        good = len(numbers := _numbers(argument)) in counts[0] and np.all(np.isfinite(numbers))
+        numbers = _numbers(argument)
+        good = len(numbers) in counts[0] and bool(np.all(np.isfinite(numbers)))
+        good = good and (len(numbers) != 4 or 0.0 <= numbers[3] <= 180.0)
     except (ValueError, SyntaxError, TypeError, MemoryError, RecursionError):
         good = False
     if not good:
-        raise ExpressionError(f"{kind}({argument:.40}): write {counts[1]}, with numbers")
+        raise ExpressionError(f"{kind}({argument:.40}): write {counts[1]}, with numbers; an angle is from 0 to 180")
 
 
 def _readable(message: str, marks: Sequence[str]) -> str:
