@@ -24,9 +24,7 @@ Product = Callable[[Array], Array]  # of columns (N, m) -> (N, m)
 SPARE = 4  # vectors more than are wanted, and half as many as these again: the last ones converge slowly
 DEPENDENT = 1e-9  # least eigenvalue of the energies of unit vectors, below which some are counted as dependent
 NEGATIVE = -1e-3  # the same, below which the matrix is not positive
-SURE = (
-    1e-8  # share of the largest mass of a unit energy: smaller ones are found anew, beside the vectors of larger ones
-)
+SURE = 1e-8  # share of the largest mass of a unit energy: smaller ones are found anew, beside vectors of larger ones
 PATIENCE = 20  # iterations in which the residual must fall by half
 TOLD = 10.0  # seconds between two lines on the iterations
 
@@ -51,7 +49,7 @@ class Lowest:
 
 
 @dataclass(frozen=True, eq=False)
-class Block:
+class Vectors:
     """Hold columns x, K x and M x (N, m)."""
 
     x: Array
@@ -59,7 +57,7 @@ class Block:
     heavy: Array
 
     @classmethod
-    def empty(cls, size: int) -> "Block":
+    def empty(cls, size: int) -> "Vectors":
         """Return no columns."""
         return cls(*(np.empty((size, 0)),) * 3)
 
@@ -68,14 +66,14 @@ class Block:
         """Return m."""
         return self.x.shape[1]
 
-    def times(self, weights: Array) -> "Block":
+    def times(self, weights: Array) -> "Vectors":
         """Return sums of the columns with weights (m, k)."""
-        return Block(self.x @ weights, self.stiff @ weights, self.heavy @ weights)
+        return Vectors(self.x @ weights, self.stiff @ weights, self.heavy @ weights)
 
-    def beside(self, other: "Block") -> "Block":
+    def beside(self, other: "Vectors") -> "Vectors":
         """Return the columns of both."""
         pairs = ((self.x, other.x), (self.stiff, other.stiff), (self.heavy, other.heavy))
-        return Block(*(np.concatenate(pair, axis=1) for pair in pairs))
+        return Vectors(*(np.concatenate(pair, axis=1) for pair in pairs))
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,7 +99,7 @@ class Pencil:
         """
         (size, k), rng = self.motions.shape, np.random.default_rng(0)
         block = min(n + n // 2 + SPARE, size - k)
-        x, steps, values, history = Block.empty(size), Block.empty(size), np.empty(0), [np.inf]
+        x, steps, values, history = Vectors.empty(size), Vectors.empty(size), np.empty(0), [np.inf]
         clock = told = time.monotonic()
         while True:
             forces, fill = x.stiff - x.heavy * values, rng.standard_normal((size, block - len(values)))
@@ -132,18 +130,18 @@ class Pencil:
         energies = np.linalg.eigvalsh(self.motions.T @ self.stiffness(self.motions))
         return Lowest(values, x, residuals, made, worst, np.abs(change) / values, float(energies.max(initial=0.0)))
 
-    def _block(self, columns: Array) -> Block:
+    def _block(self, columns: Array) -> Vectors:
         """Return columns (N, m) without their part along the motions."""
         moved = columns - self.motions @ (self._heavy.T @ columns)
         moved -= self.motions @ (self._heavy.T @ moved)
-        return Block(moved, self.stiffness(moved), self.mass(moved))
+        return Vectors(moved, self.stiffness(moved), self.mass(moved))
 
     def _forces(self, columns: Array) -> Array:
         """Return forces (N, m) without those that would move the body as a whole."""
         return columns - self._heavy @ (self.motions.T @ columns)
 
 
-def ritz(block: Block, count: int) -> tuple[Array, Array]:
+def ritz(block: Vectors, count: int) -> tuple[Array, Array]:
     """Return the lowest values of x.K x / x.M x among sums of columns, and the weights (m, .) of unit masses.
 
     There are `count` of them, or fewer where the columns are dependent. Raises ValueError where an energy is negative.

@@ -12,7 +12,7 @@ from scipy.optimize import brentq
 import iga_nn
 from iga_nn import BSplineVolume, Elasticity, MultiPatch, Poisson
 from solve import ConvergenceError
-from solve.lowest import Block, ritz
+from solve.lowest import Vectors, ritz
 
 FACES = ("u0", "u1", "v0", "v1", "w0", "w1")
 NOTHING = ("0", "0", "0")
@@ -158,7 +158,7 @@ def test_dependent_columns_and_small_eigenvalues_beside_large_ones():
     values = np.array([1e-4, 1.0, 1e4, 3.0])
     x = np.random.default_rng(0).standard_normal((4, 3))
     x = np.concatenate([np.eye(4)[:, :3] @ x[:3], np.eye(4)[:, :1]], axis=1)
-    found, weights = ritz(Block(x, values[:, None] * x, x), 4)
+    found, weights = ritz(Vectors(x, values[:, None] * x, x), 4)
     assert found == pytest.approx(values[:3], rel=1e-3)
     assert np.linalg.norm(x @ weights, axis=0) == pytest.approx(1.0, rel=1e-6)
 

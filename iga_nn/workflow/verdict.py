@@ -1,6 +1,5 @@
 """Finds the verdict on a volume for `check`, the report and the terminal."""
 
-import hashlib
 import logging
 from pathlib import Path
 from typing import Any
@@ -17,7 +16,7 @@ from ..options import MapOptions
 from ..report import advice
 from ..report import document as reports
 from ..report.patches import with_unproved
-from .output_folder import RunFolder
+from .output_folder import RunFolder, digest
 
 log = logging.getLogger(__name__)
 
@@ -39,7 +38,7 @@ def write_certificate(state: RunFolder, path: Path, body: BSplineVolume | MultiP
         facts = facts_of_file(path, body)
     state.write(
         command=command,
-        input={"file": str(path), "sha256": hashlib.sha256(path.read_bytes()).hexdigest()},
+        input={"file": str(path), "sha256": digest(path)},
         versions=reports.versions(),
         parameterization=facts,
     )

@@ -55,7 +55,7 @@ Arrays = dict[str, Any]
 
 
 @dataclass(frozen=True, eq=False)
-class Part:
+class ShapeKey:
     """A part of a shape, which is the same part whichever way it is turned."""
 
     shape: Any
@@ -64,14 +64,14 @@ class Part:
         return hash(self.shape)
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, Part) and bool(self.shape.IsSame(other.shape))
+        return isinstance(other, ShapeKey) and bool(self.shape.IsSame(other.shape))
 
 
-def parts(shape: Any, kind: Any, outside: Any = TopAbs_SHAPE) -> dict[Part, Any]:
+def parts(shape: Any, kind: Any, outside: Any = TopAbs_SHAPE) -> dict[ShapeKey, Any]:
     """Return the distinct parts of a kind with their shapes, in their order; those in an `outside` are passed over."""
-    explorer, found = TopExp_Explorer(shape, kind, outside), dict[Part, Any]()
+    explorer, found = TopExp_Explorer(shape, kind, outside), dict[ShapeKey, Any]()
     while explorer.More():
-        found.setdefault(Part(explorer.Current()), explorer.Current())
+        found.setdefault(ShapeKey(explorer.Current()), explorer.Current())
         explorer.Next()
     return found
 
@@ -102,7 +102,7 @@ def entities(model: Any) -> Iterator[Any]:
     return (model.Value(number) for number in range(1, model.NbEntities() + 1))
 
 
-def names_of(shape: Any, reader: Any, above: str = "") -> Iterator[tuple[Part, str]]:
+def names_of(shape: Any, reader: Any, above: str = "") -> Iterator[tuple[ShapeKey, str]]:
     """Yield the solids of a shape with their names or those of their products; `above` is the name of what has it."""
     entity = reader.WS().TransferReader().EntityFromShapeResult(shape, -1)
     names = [entity.Name()] if isinstance(entity, StepRepr_RepresentationItem) else []
@@ -110,7 +110,7 @@ def names_of(shape: Any, reader: Any, above: str = "") -> Iterator[tuple[Part, s
         names = [entity.Name(), entity.RelatedProductDefinition().Formation().OfProduct().Name()]
     own = next((name.ToCString() for name in names if name is not None and not name.IsEmpty()), above)
     if shape.ShapeType() == TopAbs_SOLID:
-        yield Part(shape), own
+        yield ShapeKey(shape), own
     elif shape.ShapeType() in (TopAbs_COMPOUND, TopAbs_COMPSOLID):
         inside = TopoDS_Iterator(shape)
         while inside.More():
@@ -260,7 +260,7 @@ def main(source: str, target: str, kind: str, millimetres: str, deflection: str,
     bodies, what = bodies_of(shape)
     beside = left_out(shape, bodies, what) + lost
     known = dict(names_of(shape, reader)) if len(bodies) > 1 else {}
-    names = [known.get(Part(body), "") for body in bodies] if len(bodies) > 1 else []
+    names = [known.get(ShapeKey(body), "") for body in bodies] if len(bodies) > 1 else []
     states: list[str] = []
     if what == "solid":
         bodies, states = map(list, zip(*map(healed, bodies), strict=True))

@@ -14,7 +14,7 @@ from ..groups import gathered
 from .archive import Archive
 from .common import DAMAGED, Content, most_bytes
 from .threemf_extensions import makes_another_body, name_of
-from .threemf_model import FULL, Model, Object, Reference, read_model
+from .threemf_model import FULL, ModelPart, Object, Reference, read_model
 from .threemf_package import Package
 from .threemf_slicers import check_notes
 
@@ -47,7 +47,7 @@ class _Built:
 
     def __init__(self, package: Package, root: str, max_faces: int) -> None:
         self._package, self._root, self._max_faces = package, root, max_faces
-        self._models: dict[str, Model] = {}
+        self._models: dict[str, ModelPart] = {}
         self._count = self._point_count = 0
         self._left_out = Counter[str]()
         self._foreign = set[str]()
@@ -78,7 +78,7 @@ class _Built:
             lines.append(f"left out {len(self._foreign)} kinds of elements that are not read: {shown}")
         return lines
 
-    def _model(self, part: str) -> Model:
+    def _model(self, part: str) -> ModelPart:
         """Return the model of a part, which has the unit of the root: of another one readers think differently."""
         if part not in self._models:
             model = read_model(self._package.read(part))

@@ -59,7 +59,7 @@ class Object:
 
 
 @dataclass
-class Model:
+class ModelPart:
     """What is read of a model part.
 
     skipped: number of items that a slicer does not print. foreign: elements in the list of items that are not read.
@@ -73,7 +73,7 @@ class Model:
     notices: list[str] = field(default_factory=list)
 
 
-def read_model(data: bytes) -> Model:
+def read_model(data: bytes) -> ModelPart:
     """Return the model of a part. Raises MeshError for one that is damaged, or requires extensions not read."""
     target = _Target()
     parse(data, target)
@@ -84,7 +84,7 @@ class _Target(Xml):
     """The target of an XML parser that keeps objects and items, and no tree."""
 
     def __init__(self) -> None:
-        self.model = Model()
+        self.model = ModelPart()
         self._prefixes: dict[str, str] = {}
         self._depth = 0
         self._skip_from = 0  # depth of the element that is skipped with all in it, 0 for none
