@@ -163,7 +163,8 @@ def test_the_report_names_the_place_in_plain_types():
 
 
 def test_check_refuses_to_call_an_overlapping_volume_good(tmp_path, capsys):
-    from iga_nn.cli.commands import NOT_CERTIFIED, main
+    from iga_nn.cli import NOT_CERTIFIED
+    from iga_nn.cli.commands import main
 
     bent(1.3).save(tmp_path / "ring.npz")
     assert main(["check", str(tmp_path / "ring.npz")]) == NOT_CERTIFIED
