@@ -10,6 +10,7 @@ import iga_nn
 
 ROOT = Path(iga_nn.__file__).resolve().parents[1]
 TEXT = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
+MOST_WORDS = 1000
 
 
 def test_every_path_exists():
@@ -55,3 +56,8 @@ def test_hooks_are_the_linters_of_make():
         r"^\t\$\(BIN\)/(\S+)", (ROOT / "Makefile").read_text().split("\nlint:")[1].split("\n\n")[0], re.M
     )
     assert hooks == [f".venv/bin/{name}" for name in commands]
+
+
+def test_contributing_is_short():
+    """Modules' docstrings say what they decide: an index of them here would be read by nobody, and grow old."""
+    assert len(TEXT.split()) <= MOST_WORDS
