@@ -1,4 +1,4 @@
-"""Pages with formulas have sentences that a reader can hold: code, tables and displayed formulas are not counted."""
+"""Pages have sentences that a reader can hold: code, tables and displayed formulas are not counted."""
 
 from __future__ import annotations
 
@@ -8,7 +8,17 @@ import pytest
 from documents import ROOT
 
 MOST_WORDS = 30
-PAGES = ("docs/method.md", "docs/solver.md", "docs/ways.md", "CONTRIBUTING.md")
+PAGES = (
+    "docs/method.md",
+    "docs/solver.md",
+    "docs/ways.md",
+    "docs/blocks.md",
+    "docs/sharp_edges.md",
+    "docs/stages.md",
+    "docs/limits.md",
+    "docs/patches.md",
+    "CONTRIBUTING.md",
+)
 DISPLAYED = re.compile(r"^\$\$\n(.*?)(\.?)\n\$\$$", flags=re.DOTALL | re.MULTILINE)
 LEFT_OUT = re.compile(
     r"^```.*?^```$|^\s*\|.*?$|^#.*?$|^<!--.*?-->$|\((?:https?:|[\w./]+\.md)[^()]*\)", flags=re.DOTALL | re.MULTILINE
@@ -29,7 +39,7 @@ def sentences(text: str) -> list[str]:
 @pytest.mark.parametrize("page", PAGES)
 def test_no_sentence_is_long(page):
     found = sentences((ROOT / page).read_text(encoding="utf-8"))
-    assert len(found) > 30
+    assert len(found) > 10
     assert [one for one in found if len(one.split()) > MOST_WORDS] == []
 
 
