@@ -33,7 +33,7 @@ def main(out: str | Path = "out/l_shape") -> Path:
         iga_nn.BSplineVolume.from_function(lambda u, v, w, x=x, y=y: (x + u, y + v, 0.5 * w), control_points=5)
         for x, y in PLACES
     ]
-    body = iga_nn.MultiPatch.from_patches(cubes)
+    body = iga_nn.Body.from_patches(cubes)
     ends = {"w0": "0", "w1": "0"}
     edge = iga_nn.Poisson(exact=singular, source="0", neumann=ends)
     for name, law in (("singular", edge), ("smooth", iga_nn.Poisson(exact="sin(x)*exp(y)"))):

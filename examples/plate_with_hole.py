@@ -47,7 +47,7 @@ def displacement(x: np.ndarray, y: np.ndarray, along: int) -> np.ndarray:
 
 def main(out: str | Path = "out/plate_with_hole") -> Path:
     """Print the stress at the hole beside Kirsch's; returns the picture of the displacement."""
-    plate = iga_nn.MultiPatch.from_patches([sector(number) for number in range(PARTS)])
+    plate = iga_nn.Body.from_patches([sector(number) for number in range(PARTS)])
     pulled = [lambda x, y, z: displacement(x, y, 0), lambda x, y, z: displacement(x, y, 1), "0"]
     law = iga_nn.Elasticity(poisson_ratio=RATIO, fix={"u1": pulled}, symmetry="w0 or w1")
     solution = iga_nn.solve(plate, law)

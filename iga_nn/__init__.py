@@ -20,6 +20,7 @@ os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
 
 _HOME = {  # module, and the name there where it is another one; type checkers read __init__.pyi
     "BSplineVolume": "parameterize.spline.volume",
+    "Body": "parameterize.spline.body",
     "Elasticity": "solve",
     "ElasticityOptions": "iga_nn.options",
     "Form": "solve",
@@ -29,7 +30,6 @@ _HOME = {  # module, and the name there where it is another one; type checkers r
     "March": "solve",
     "MeshError": "parameterize.surface.surface",
     "Modes": "solve",
-    "MultiPatch": "parameterize.spline.multipatch",
     "Parameterization": "parameterize.run",
     "Poisson": "solve",
     "PoissonOptions": "iga_nn.options",
@@ -77,8 +77,12 @@ _refuse_shadowed("parameterize", "solve")
 
 def __getattr__(name: str) -> Any:
     """Load a public name from its module (PEP 562)."""
-    if name not in _HOME:
+    if name not in _HOME and not name[0].isupper():  # such as a module of this package, which needs no other one
         raise AttributeError(f"module 'iga_nn' has no attribute {name!r}")
+    if name not in _HOME:
+        from parameterize.old_names import renamed
+
+        return __getattr__(renamed("iga_nn", name))
     module, _, attribute = _HOME[name].partition(":")
     value = getattr(import_module(module), attribute or name)
     globals()[name] = value

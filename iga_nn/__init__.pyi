@@ -2,8 +2,8 @@ from parameterize.certificate.body import certify as certify
 from parameterize.config import preset as preset
 from parameterize.run import Parameterization as Parameterization
 from parameterize.run import parameterize as parameterize
+from parameterize.spline.body import Body as Body
 from parameterize.spline.interface import Interface as Interface
-from parameterize.spline.multipatch import MultiPatch as MultiPatch
 from parameterize.spline.volume import BSplineVolume as BSplineVolume
 from parameterize.surface.surface import MeshError as MeshError
 from parameterize.surface.surface import Surface as Surface

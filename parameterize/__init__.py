@@ -33,12 +33,13 @@ provide_folder()  # before the first module with kernels is loaded
 
 _HOME = {  # type checkers read __init__.pyi
     "BSplineVolume": "spline.volume",
-    "BodyCertificate": "certificate.body",
+    "Body": "spline.body",
     "BoundaryMap": "cube.boundary_map",
-    "Certificate": "certificate.jacobian",
+    "Certificate": "certificate.body",
     "Config": "config",
     "MeshError": "surface.surface",
     "Parameterization": "run",
+    "PatchCertificate": "certificate.jacobian",
     "QualityReport": "quality.quality",
     "Surface": "surface.surface",
     "certify": "certificate.body",
@@ -54,5 +55,7 @@ __all__ = [*_HOME]
 def __getattr__(name: str) -> Any:
     """Load a public name from the module it lives in (PEP 562)."""
     if name not in _HOME:
-        raise AttributeError(f"module 'parameterize' has no attribute {name!r}")
+        from .old_names import renamed
+
+        return __getattr__(renamed("parameterize", name))
     return getattr(import_module(f"{__name__}.{_HOME[name]}"), name)

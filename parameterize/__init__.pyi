@@ -1,6 +1,6 @@
-from .certificate.body import BodyCertificate as BodyCertificate
+from .certificate.body import Certificate as Certificate
 from .certificate.body import certify as certify
-from .certificate.jacobian import Certificate as Certificate
+from .certificate.jacobian import PatchCertificate as PatchCertificate
 from .config import Config as Config
 from .config import preset as preset
 from .cube.boundary_map import BoundaryMap as BoundaryMap
@@ -8,6 +8,7 @@ from .quality.quality import QualityReport as QualityReport
 from .quality.quality import measure as measure
 from .run import Parameterization as Parameterization
 from .run import parameterize as parameterize
+from .spline.body import Body as Body
 from .spline.volume import BSplineVolume as BSplineVolume
 from .surface.surface import MeshError as MeshError
 from .surface.surface import Surface as Surface

@@ -10,14 +10,14 @@ from .arrays import Array
 from .cube.boundary_map import BoundaryMap
 from .cube.cube import axis_and_side
 from .quality.distances import closest_in_faces, nearest_on_boundary
-from .spline.multipatch import MultiPatch
+from .spline.body import Body
 from .spline.sampled_boundary import SampledBoundary
 from .spline.volume import BSplineVolume
 from .surface.nearest import closest_triangles
 from .surface.surface import Surface
 
 
-def carried(boundary: BoundaryMap, body: BSplineVolume | MultiPatch, surface: Surface) -> BoundaryMap:
+def carried(boundary: BoundaryMap, body: Body, surface: Surface) -> BoundaryMap:
     """Return the boundary map of the large surface (in the user's units) from that of its copy.
 
     Its vertices come first, with its own triangles and groups as the part. Those of the copy, cut along the cube's
@@ -25,10 +25,10 @@ def carried(boundary: BoundaryMap, body: BSplineVolume | MultiPatch, surface: Su
     out, and the large surface alone is the map's.
     """
     n, faces, groups = len(surface.vertices), surface.faces, surface.groups
-    if isinstance(body, MultiPatch):
+    if not body.is_single:
         patches, places, _ = nearest_on_boundary(surface.vertices, body, SampledBoundary.of(body))
         return BoundaryMap(surface.vertices, places, faces, part_faces=faces, groups=groups, patches=patches)
-    parameters = _places(boundary, body, surface.vertices)
+    parameters = _places(boundary, body.only, surface.vertices)
     return BoundaryMap(
         np.concatenate([surface.vertices, boundary.vertices]),
         np.concatenate([parameters, boundary.parameters]),

@@ -45,7 +45,7 @@ def optimize_coarse_first(
     """
     report: dict[str, Any] = {"history": history, "progress": progress}
     fine = (open_uniform_knots(config.control_points, config.degree),) * 3
-    if not start.nets.one_cube or len(fine[0]) == len(start.knots[0]):
+    if not start.nets.is_single or len(fine[0]) == len(start.knots[0]):
         return *optimize(start, fit, config, schedule, weights, checkpoints=checkpoints, **report), fit
     begun = min(schedule.grown or PATIENT_ROUNDS, schedule.rounds - 1)  # at least one round is on all
     first = replace(schedule, rounds=begun)

@@ -28,9 +28,9 @@ from .optimization.term import Weights
 from .progress import History, ProgressCallback
 from .quality.distortion import arap_grid, own_boxes
 from .quality.two_sided import two_sided
+from .spline.body import shared_numbers
 from .spline.bspline import breakpoints, midpoints
 from .spline.directions import tied_spans
-from .spline.multipatch import shared_numbers
 from .spline.nets import Nets
 from .spline.spline_map import SplineMap
 from .spline.volume import AXES
@@ -150,7 +150,7 @@ class _Spots:
         spline, nets = found.spline, found.spline.nets
         gaps = two_sided(spline.body, fit.points, fit.places.triangles)
         distance = gaps.summary().scaled(1.0 / float(np.linalg.norm(np.ptp(fit.points, axis=0))))
-        size = nets.shapes[0] if nets.one_cube else shared_numbers(nets.shapes, nets.interfaces)[1]
+        size = nets.shapes[0] if nets.is_single else shared_numbers(nets.shapes, nets.interfaces)[1]
         level = Level(size, distance.rms, distance.max, len(found.unproved))
         if course is not None:
             level = replace(level, rounds=dict(course.rounds), seconds=course.seconds, ending=str(course.ending))
@@ -190,7 +190,7 @@ class _Spots:
 
 def _boxes(spline: SplineMap) -> Array:
     """Return the sides (blocks, 3) of the boxes against which distortion is measured: one cube, or each block's own."""
-    return np.ones((1, 3)) if spline.nets.one_cube else own_boxes(spline.body)
+    return np.ones((1, 3)) if spline.nets.is_single else own_boxes(spline.body)
 
 
 def totals_along(places: Array, amounts: Array, knots: Knots) -> list[Array]:

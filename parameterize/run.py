@@ -13,9 +13,8 @@ from numpy.typing import ArrayLike, NDArray
 from .arrays import IntArray, in_brackets
 from .attempts import attempts
 from .carrying import carried
-from .certificate.body import BodyCertificate, certify
+from .certificate.body import Certificate, certify
 from .certificate.boundary import check_boundary
-from .certificate.jacobian import Certificate
 from .checkpoint import Checkpoints
 from .config import Config, preset
 from .cube.boundary_map import BoundaryMap, boundary_map
@@ -27,14 +26,13 @@ from .optimization.surface_distance import SurfaceFit
 from .progress import History, ProgressCallback, ignore, timed
 from .quality.quality import QualityReport, measure
 from .refinement import Refinement, refine
-from .spline.multipatch import MultiPatch, as_multipatch
-from .spline.volume import BSplineVolume
+from .spline.body import Body, BodyLike
 from .starts.start import Origin, Task
 from .starts.tried import AttemptReport, best_of
 from .surface.surface import Surface
 from .training.backend import choose_device, choose_precision
 
-MadeCallback = Callable[[BSplineVolume | MultiPatch, dict[str, NDArray[Any]]], None]
+MadeCallback = Callable[[BodyLike, dict[str, NDArray[Any]]], None]
 _LAST_SLIDES = 20  # of the boundary parameters before the boundary map is made, and again after `_LAST_SWEEPS`
 _LAST_SWEEPS = 600  # over the triangles that the last slides flipped, at most: nothing moves after them
 
@@ -45,11 +43,11 @@ class Parameterization(Brief):
 
     Attributes
     ----------
-    volume : BSplineVolume or MultiPatch
+    volume : BSplineVolume or Body
         The map F of a cube, or of several blocks that are glued.
     boundary : BoundaryMap
         Every surface vertex with its parameters, and the block that they belong to.
-    certificate : Certificate or BodyCertificate
+    certificate : Certificate
         What is proved of det J.
     quality : QualityReport
         What is measured; printed, a table.
@@ -82,9 +80,9 @@ class Parameterization(Brief):
     (True, ['certify', 'fit', 'optimize'])
     """
 
-    volume: BSplineVolume | MultiPatch
+    volume: BodyLike
     boundary: BoundaryMap
-    certificate: Certificate | BodyCertificate
+    certificate: Certificate
     quality: QualityReport
     history: dict[str, NDArray[Any]]
     seconds: dict[str, float]
@@ -191,18 +189,18 @@ def parameterize(
             options = config.spline, config.refinement, attempt.weights
             found, fit, told = refine(found, fit, *options, checkpoints=checkpoints, **report)
     with timed(seconds, "optimize"):
-        volume, boundary = _in_users_units(found, fit, task)
+        body, boundary = _in_users_units(found, fit, task)
         if copy is not surface:
-            boundary = carried(boundary, volume, surface)
+            boundary = carried(boundary, body, surface)
     steps = history.arrays()
     if when_made is not None:
-        when_made(volume, steps)
+        when_made(body.simplest, steps)
     with timed(seconds, "certify"):
-        certificate = certify(volume)  # of the volume in the user's units: bringing it there rounds
-        proofs = certificate, check_boundary(volume)
-        quality = measure(volume, surface.vertices, surface.faces, surface.scale, boundary, *proofs, surface.sharp)
+        certificate = certify(body)  # of the body in the user's units: bringing it there rounds
+        proofs = certificate, check_boundary(body)
+        quality = measure(body, surface.vertices, surface.faces, surface.scale, boundary, *proofs, surface.sharp)
     return Parameterization(
-        volume=volume,
+        volume=body.simplest,
         boundary=boundary,
         certificate=certificate,
         quality=quality,
@@ -295,21 +293,21 @@ def corner_vertices(surface: Surface, corners: ArrayLike) -> IntArray:
     return np.asarray(numbers, dtype=np.int64)
 
 
-def _in_users_units(found: Optimized, fit: SurfaceFit, task: Task) -> tuple[BSplineVolume | MultiPatch, BoundaryMap]:
+def _in_users_units(found: Optimized, fit: SurfaceFit, task: Task) -> tuple[Body, BoundaryMap]:
     """Return the map and its boundary map; parameters are first brought close to this map's closest points."""
     surface, spline = task.surface, found.spline
-    if not spline.nets.one_cube:
+    if not spline.nets.is_single:
         reassign(fit, spline.control)
     places = fit.places.at_closest_points(spline.control, fit.points, _LAST_SLIDES, _LAST_SWEEPS)
-    patches = tuple(
-        replace(patch, control_points=surface.from_unit(patch.control_points)) for patch in as_multipatch(spline.body)
+    unit = spline.body
+    body = replace(
+        unit, patches=tuple(replace(one, control_points=surface.from_unit(one.control_points)) for one in unit)
     )
-    if not spline.nets.one_cube:
+    if not body.is_single:
         where, blocks = places.parameters[: task.own], places.blocks[: task.own]
         faces = surface.faces
         boundary = BoundaryMap(surface.vertices, where, faces, part_faces=faces, groups=surface.groups, patches=blocks)
-        return MultiPatch(patches, spline.nets.interfaces), boundary
-    (volume,) = patches
+        return body, boundary
     own = np.concatenate([surface.vertices, surface.from_unit(fit.points[task.own :])])
-    boundary = boundary_map(volume, CubeLayout(own, places.triangles, places.parameters, task.own))
-    return volume, replace(boundary, part_faces=surface.faces, groups=surface.groups)
+    boundary = boundary_map(body.only, CubeLayout(own, places.triangles, places.parameters, task.own))
+    return body, replace(boundary, part_faces=surface.faces, groups=surface.groups)

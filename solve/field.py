@@ -12,8 +12,8 @@ from parameterize.arrays import Array, Knots
 from parameterize.display import Brief
 from parameterize.files import array_names, load_arrays, save_arrays
 from parameterize.quality.distances import nearest_on_boundary
+from parameterize.spline.body import Body, BodyLike
 from parameterize.spline.bspline import evaluate_at, evaluate_grid
-from parameterize.spline.multipatch import MultiPatch
 from parameterize.spline.sampled_boundary import SampledBoundary
 from parameterize.spline.volume import BSplineVolume, checked_knots, load_spline, save_spline
 
@@ -145,10 +145,10 @@ class SplineField(Brief):
         values = values.transpose(0, *(1 + axis for axis in (*x.order, *single))).reshape(-1, *x.shape[1:])
         return values if self.coefficients.ndim == 4 else values[0]
 
-    def fits(self, body: BSplineVolume | MultiPatch) -> bool:
+    def fits(self, body: BodyLike) -> bool:
         """Return whether the field may be a datum on a body: its own volume is the body, or it has none."""
         own, volume = self.geometry, body
-        if isinstance(volume, MultiPatch):
+        if isinstance(volume, Body):
             return False
         if own is None or own is volume:
             return True
@@ -187,7 +187,7 @@ class MultiPatchField(Brief):
     --------
     >>> import iga_nn
     >>> halves = [iga_nn.BSplineVolume.from_function(lambda u, v, w, a=a: (u + a, v, w), 4) for a in (0, 1)]
-    >>> rod = iga_nn.MultiPatch.from_patches(halves)
+    >>> rod = iga_nn.Body.from_patches(halves)
     >>> heat = iga_nn.solve(rod, iga_nn.Poisson(exact="x")).field
     >>> heat.probe([[0.5, 0.5, 0.5], [1.5, 0.5, 0.5]]).round(9)
     array([0.5, 1.5])
@@ -237,10 +237,10 @@ class MultiPatchField(Brief):
         """Raise ValueError: points of the solver have the values of the field of their patch."""
         raise ValueError("a field on several patches has values at points of a patch: use its `patches`, or probe")
 
-    def fits(self, body: BSplineVolume | MultiPatch) -> bool:
+    def fits(self, body: BodyLike) -> bool:
         """Return whether the field may be a datum on a body: its own patches are those of the body."""
         return (
-            isinstance(body, MultiPatch)
+            isinstance(body, Body)
             and len(body) == len(self.patches)
             and all(field.fits(volume) for field, volume in zip(self.patches, body.patches, strict=True))
         )

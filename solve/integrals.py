@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from parameterize.arrays import Array, IntArray
+from parameterize.spline.body import Body, BodyLike, as_body
 from parameterize.spline.bspline import breakpoints, gauss_points
 from parameterize.spline.interface import axis_side, face_label
-from parameterize.spline.multipatch import MultiPatch, as_multipatch
 from parameterize.spline.orientation import exact_points
 from parameterize.spline.volume import BSplineVolume
 
@@ -24,11 +24,11 @@ from .solution import MultiPatchSolution, Solution
 
 Integrand = Quantity | Callable[[Points], ArrayLike]
 Patch = BSplineVolume | Solution
-Body = Patch | MultiPatch | MultiPatchSolution
+Domain = Patch | Body | MultiPatchSolution
 
 
 def integrate(
-    body: Body,
+    body: Domain,
     what: str | Integrand | None = None,
     over: Regions | None = None,
 ) -> Array:
@@ -36,7 +36,7 @@ def integrate(
 
     Parameters
     ----------
-    body : BSplineVolume, MultiPatch, Solution or MultiPatchSolution
+    body : BSplineVolume, Body, Solution or MultiPatchSolution
         The domain of the integral.
     what : str or function, optional
         The integrand; by default 1, so that the integral is the volume or the area. For a solution the name of a
@@ -64,7 +64,7 @@ def integrate(
     >>> bool(0.1 < mean < 0.2)
     True
     """
-    if not isinstance(body, Body):
+    if not isinstance(body, Domain):
         raise TypeError(f"body must be a volume or a solution, got {body!r:.80}")
     if over is None:
         return np.asarray(sum(_over_patch(patch, what) for patch in _patches(body)))
@@ -111,14 +111,14 @@ def resultant(solution: Solution | MultiPatchSolution, over: Regions) -> Array:
     return total
 
 
-def _patches(body: Body) -> Sequence[Patch]:
+def _patches(body: Domain) -> Sequence[Patch]:
     """Return the patches of a body, or the solutions on them."""
-    return body.patches if isinstance(body, MultiPatch | MultiPatchSolution) else (body,)
+    return body.patches if isinstance(body, Body | MultiPatchSolution) else (body,)
 
 
-def _maps(body: Body) -> BSplineVolume | MultiPatch:
+def _maps(body: Domain) -> BodyLike:
     """Return the maps of a body or of a solution."""
-    return body if isinstance(body, BSplineVolume | MultiPatch) else body.geometry
+    return body if isinstance(body, BodyLike) else body.geometry
 
 
 def _volume_of(body: Patch) -> BSplineVolume:
@@ -147,18 +147,18 @@ def _over_patch(body: Patch, what: str | Integrand | None) -> Array:
     return np.asarray(total)
 
 
-def _surface_rules(body: Body, over: Regions) -> Iterator[tuple[Patch, SurfaceRule]]:
+def _surface_rules(body: Domain, over: Regions) -> Iterator[tuple[Patch, SurfaceRule]]:
     """Yield the quadrature rules, one an outer face, of the part of the boundary that is in one of the regions.
 
     Each rule comes with its patch. Raises ValueError where that part is empty.
     """
-    regions, glued, found = _placed(body, over), as_multipatch(_maps(body)), False
+    regions, glued, found = _placed(body, over), as_body(_maps(body)), False
     for number, (patch, names) in enumerate(zip(_patches(body), glued.outer, strict=True)):
         degree = max(_counts(patch)) - 1  # a rule has a point more
         rows = [same_smoothness(knots, old, degree) for knots, old in zip(patch.knots, patch.degrees, strict=True)]
         space = TrialSpace((degree, degree, degree), (rows[0], rows[1], rows[2]))
         for face in names:
-            name = face_label(number, face) if isinstance(_maps(body), MultiPatch) else face
+            name = face_label(number, face) if isinstance(_maps(body), Body) else face
 
             def codes(x: Array, normal: Array, name: str = name) -> IntArray:
                 return np.any([region.holds(x, normal, name) for region in regions], axis=0).astype(np.int64)
@@ -173,7 +173,7 @@ def _surface_rules(body: Body, over: Regions) -> Iterator[tuple[Patch, SurfaceRu
         )
 
 
-def _placed(body: Body, over: Regions) -> list[Region]:
+def _placed(body: Domain, over: Regions) -> list[Region]:
     """Return regions with X, Y, Z measured in the body, and with the surface of the solution's problem."""
     if not over or not isinstance(over, Region | str | list | tuple):
         raise ValueError(f"over: give regions, such as 'nz > 0.9' or 'u0', got {over!r:.80}")

@@ -12,8 +12,7 @@ import numpy as np
 from parameterize.arrays import Array
 from parameterize.display import Brief
 from parameterize.files import save_arrays
-from parameterize.spline.multipatch import MultiPatch
-from parameterize.spline.volume import BSplineVolume
+from parameterize.spline.body import BodyLike
 from parameterize.threads import one_blas_thread
 
 from .diagnostics import ConvergenceError, bending_notices
@@ -103,7 +102,7 @@ class Modes(Brief):
 
 
 def modes(
-    body: BSplineVolume | MultiPatch,
+    body: BodyLike,
     law: BoundaryValueProblem,
     density: float = 1.0,
     n: int = 6,
@@ -122,7 +121,7 @@ def modes(
 
     Parameters
     ----------
-    body : BSplineVolume or MultiPatch
+    body : BSplineVolume or Body
         The body.
     law : Elasticity, Poisson or Problem
         A symmetric law; only the data of held faces, and Robin's alpha, have an effect.

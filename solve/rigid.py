@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from parameterize.arrays import Array, Mask
+from parameterize.spline.body import all_control_points, as_body, size_of
 from parameterize.spline.bspline import greville, interpolate_grid
-from parameterize.spline.multipatch import all_control_points, as_multipatch, size_of
 
 from .discretization.boundary import FaceRule
 from .discretization.quadrature import gauss_rule, map_planes
@@ -38,7 +38,7 @@ def rigid_motions(system: System) -> Array:
     """
     fixed = [full[0] == 0.0 for full in system.unknowns.spread(np.ones((1, *system.unknowns.shape)))]
     found = []
-    for part in as_multipatch(system.body).parts:
+    for part in as_body(system.body).parts:
         motions = _without_energy([system.patches[i] for i in part])
         supports = [one for i in part for one in _supports(system.patches[i], fixed[i], motions)]
         free = motions.combined(_unheld(supports)) if supports and motions.count else motions

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from parameterize.arrays import Array
 from parameterize.display import Shown, above
-from parameterize.spline.multipatch import MultiPatch
+from parameterize.spline.body import Body
 from parameterize.spline.volume import BSplineVolume
 
 from .discretization.errors import Errors
@@ -215,7 +215,7 @@ class MultiPatchSolution(MultiPatchField, Shown):
     ----------
     patches : tuple of Solution
         The solution on each patch, with the body's report.
-    geometry : MultiPatch
+    geometry : Body
         The maps.
     report : SolveReport
         Unknowns, errors, iterations and seconds of the body.
@@ -226,14 +226,14 @@ class MultiPatchSolution(MultiPatchField, Shown):
     --------
     >>> import iga_nn
     >>> halves = [iga_nn.BSplineVolume.from_function(lambda u, v, w, a=a: (u + a, v, w), 4) for a in (0, 1)]
-    >>> rod = iga_nn.MultiPatch.from_patches(halves)
+    >>> rod = iga_nn.Body.from_patches(halves)
     >>> solution = iga_nn.solve(rod, iga_nn.Poisson(exact="x*y*z"))
     >>> solution.report.dofs, solution.probe([[1.5, 0.5, 0.5]]).round(6)
     (112, array([0.375]))
     """
 
     patches: tuple[Solution, ...]
-    geometry: MultiPatch
+    geometry: Body
     report: SolveReport
     problem: BoundaryValueProblem
 

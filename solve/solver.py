@@ -7,9 +7,9 @@ from typing import Any, overload
 import numpy as np
 
 from parameterize.compilation import compilation_told
+from parameterize.spline.body import Body, BodyLike, as_body
 from parameterize.spline.bspline import greville, open_uniform_knots
 from parameterize.spline.interface import face_label
-from parameterize.spline.multipatch import MultiPatch, as_multipatch
 from parameterize.spline.volume import BSplineVolume
 
 from .assembly import assemble_data, balanced
@@ -32,15 +32,13 @@ from .system import System, build
 @overload
 def solve_problem(body: BSplineVolume, problem: Poisson | Elasticity | Problem, **how: Any) -> Solution: ...
 @overload
-def solve_problem(body: MultiPatch, problem: Poisson | Elasticity | Problem, **how: Any) -> MultiPatchSolution: ...
-def solve_problem(
-    body: BSplineVolume | MultiPatch, problem: Poisson | Elasticity | Problem, **how: Any
-) -> Solution | MultiPatchSolution:
+def solve_problem(body: Body, problem: Poisson | Elasticity | Problem, **how: Any) -> MultiPatchSolution: ...
+def solve_problem(body: BodyLike, problem: Poisson | Elasticity | Problem, **how: Any) -> Solution | MultiPatchSolution:
     """Solve a problem on a volume, or on several patches.
 
     Parameters
     ----------
-    body : BSplineVolume or MultiPatch
+    body : BSplineVolume or Body
         The map, or the maps.
     problem : Poisson, Elasticity or Problem
         The law and its data.
@@ -107,17 +105,15 @@ def solve_problem(
 @overload
 def solve_with(body: BSplineVolume, problem: BoundaryValueProblem, options: SolveOptions) -> Solution: ...
 @overload
-def solve_with(body: MultiPatch, problem: BoundaryValueProblem, options: SolveOptions) -> MultiPatchSolution: ...
-def solve_with(
-    body: BSplineVolume | MultiPatch, problem: BoundaryValueProblem, options: SolveOptions
-) -> Solution | MultiPatchSolution:
+def solve_with(body: Body, problem: BoundaryValueProblem, options: SolveOptions) -> MultiPatchSolution: ...
+def solve_with(body: BodyLike, problem: BoundaryValueProblem, options: SolveOptions) -> Solution | MultiPatchSolution:
     """Return the solution of `solve_problem` for options in one object."""
     check_device(options.device, problem)
     return discretized(body, problem, options).solve_with(options)
 
 
 def discretize(
-    body: BSplineVolume | MultiPatch,
+    body: BodyLike,
     problem: Poisson | Elasticity | Problem,
     *,
     refine: int = 0,
@@ -149,9 +145,7 @@ def discretize(
     return discretized(body, problem, options)
 
 
-def discretized(
-    body: BSplineVolume | MultiPatch, problem: BoundaryValueProblem, options: SolveOptions, is_loose: bool = False
-) -> System:
+def discretized(body: BodyLike, problem: BoundaryValueProblem, options: SolveOptions, is_loose: bool = False) -> System:
     """Return the system of `discretize`; that of a loose body, for its modes, needs no supports."""
     placed, patches = prepared(body, problem, options)
     if not is_loose:
@@ -160,7 +154,7 @@ def discretized(
 
 
 def prepared(
-    body: BSplineVolume | MultiPatch, problem: BoundaryValueProblem, options: SolveOptions
+    body: BodyLike, problem: BoundaryValueProblem, options: SolveOptions
 ) -> tuple[BoundaryValueProblem, list[PatchProblem]]:
     """Check body and problem; return the problem placed in the body, and the problem on each patch."""
     placed, patches = _on_patches(body, problem, options)
@@ -174,10 +168,10 @@ def prepared(
 
 
 def _on_patches(
-    body: BSplineVolume | MultiPatch, problem: BoundaryValueProblem, options: SolveOptions
+    body: BodyLike, problem: BoundaryValueProblem, options: SolveOptions
 ) -> tuple[BoundaryValueProblem, list[PatchProblem]]:
     """Return the problem placed in the body, and the problem on each patch."""
-    glued, several = as_multipatch(body), isinstance(body, MultiPatch)
+    glued, several = as_body(body), isinstance(body, Body)
     if not isinstance(problem, BoundaryValueProblem):
         raise TypeError(f"problem must be a Poisson, an Elasticity or a Problem, got {type(problem).__name__}")
     if several and options.comm is not None and options.comm.size > 1:
@@ -193,7 +187,7 @@ def _on_patches(
     return placed, patches
 
 
-def _demand_known_patches(body: MultiPatch, problem: BoundaryValueProblem, several: bool) -> None:
+def _demand_known_patches(body: Body, problem: BoundaryValueProblem, several: bool) -> None:
     """Raise ValueError for data of faces that are not outer faces of the body, and of patches that it does not have.
 
     several: whether faces are called by their patches, too, as "p2_u0".
@@ -207,7 +201,7 @@ def _demand_known_patches(body: MultiPatch, problem: BoundaryValueProblem, sever
             raise ValueError(f"{name}: there is no patch {beyond[0]!r}; the body has {len(body)}, from 0 on")
 
 
-def check_problem(body: BSplineVolume | MultiPatch, problem: BoundaryValueProblem, comm: Any = None) -> None:
+def check_problem(body: BodyLike, problem: BoundaryValueProblem, comm: Any = None) -> None:
     """Evaluate a problem's data at the points of the coarsest solve; finer levels use points between these.
 
     comm: a communicator of mpi4py whose processes share the work. Raises ExpressionError where the data are not finite
@@ -226,7 +220,7 @@ def check_problem(body: BSplineVolume | MultiPatch, problem: BoundaryValueProble
     if problem.fixes_nothing and problem.conditions:
         demand_supports(problem, faces, patches[0].space, [patch.volume for patch in patches])
     if problem.fixes_nothing and not problem.form.has_reaction:
-        unknowns = unknowns_of([patch.space for patch in patches], as_multipatch(body).interfaces)
+        unknowns = unknowns_of([patch.space for patch in patches], as_body(body).interfaces)
         balanced(unknowns.collect(loads), unknowns, patches[0].space)
     if problem.exact is not None:
         for patch in patches:

@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from parameterize.display import Shown
+from parameterize.spline.body import BodyLike
 from parameterize.spline.bspline import greville, open_uniform_knots
-from parameterize.spline.multipatch import MultiPatch
 from parameterize.spline.volume import BSplineVolume
 
 from .forms.boundary_value_problem import BoundaryValueProblem
@@ -61,7 +61,7 @@ class Convergence(list[ConvergenceRow], Shown):
 
 
 def convergence(
-    volume: BSplineVolume | MultiPatch,
+    volume: BodyLike,
     problem: BoundaryValueProblem,
     refine: Iterable[int] = range(3),
     degree: int | None = None,

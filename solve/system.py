@@ -12,9 +12,8 @@ from scipy.sparse.linalg import LinearOperator
 
 from parameterize.arrays import Array
 from parameterize.conjugate_gradients import LinearResult, conjugate_gradients
+from parameterize.spline.body import Body, BodyLike, as_body
 from parameterize.spline.interface import Interface
-from parameterize.spline.multipatch import MultiPatch, as_multipatch
-from parameterize.spline.volume import BSplineVolume
 from parameterize.threads import one_blas_thread
 
 from .assembly import balanced
@@ -82,7 +81,7 @@ class System:
     (0, (5, 5, 5))
     """
 
-    body: BSplineVolume | MultiPatch
+    body: BodyLike
     problem: BoundaryValueProblem
     patches: tuple[PatchSystem, ...]
     unknowns: Unknowns
@@ -136,7 +135,7 @@ class System:
         if np.size(x) != self.right.size:
             raise ValueError(f"x must have {self.right.size} entries, the free coefficients, got {np.size(x)}")
         found = self._splines(self._filled(np.reshape(x, self.right.shape)))
-        return MultiPatchField(tuple(found)) if isinstance(self.body, MultiPatch) else found[0]
+        return MultiPatchField(tuple(found)) if isinstance(self.body, Body) else found[0]
 
     def _filled(self, free: Array) -> list[Array]:
         """Return all coefficients (c, n_u, n_v, n_w) of each patch, with the fixed coefficients."""
@@ -194,7 +193,7 @@ class System:
     def solve_with(self, options: IterationOptions) -> Solution | MultiPatchSolution:
         """Return the solution of `solve` for options in one object."""
         check_device(options.device, self.problem)
-        if isinstance(self.body, MultiPatch) and options.device != "cpu":
+        if isinstance(self.body, Body) and options.device != "cpu":
             raise ValueError(f"several patches are solved on device='cpu' only, got device={options.device!r}")
         with one_blas_thread():
             solution = self._solve(options)
@@ -251,7 +250,7 @@ class System:
             Solution(field.degrees, field.knots, field.coefficients, patch.volume, report=report, problem=patch.problem)
             for field, patch in zip(self._splines(full), self.patches, strict=True)
         )
-        if isinstance(self.body, MultiPatch):
+        if isinstance(self.body, Body):
             return MultiPatchSolution(solutions, self.body, report, problem)
         return solutions[0]
 
@@ -322,7 +321,7 @@ def _nothing(x: Array) -> tuple[Array, None]:
 
 
 def build(
-    body: BSplineVolume | MultiPatch,
+    body: BodyLike,
     problem: BoundaryValueProblem,
     patches: Sequence[PatchProblem],
     options: SolveOptions,
@@ -335,7 +334,7 @@ def build(
     is_loose: whether motions that nothing holds are no fault; a body with a shift is loose.
     """
     is_loose = is_loose or shift != 0.0
-    start, glued = time.process_time(), as_multipatch(body)
+    start, glued = time.process_time(), as_body(body)
     with one_blas_thread():
         systems = tuple(PatchSystem.of(patch, options, shift) for patch in patches)
         _demand_held(glued, problem, systems, is_loose)
@@ -354,9 +353,7 @@ def build(
     return System(body, problem, systems, unknowns, blocks, right, setup)
 
 
-def _demand_held(
-    body: MultiPatch, problem: BoundaryValueProblem, systems: Sequence[PatchSystem], is_loose: bool
-) -> None:
+def _demand_held(body: Body, problem: BoundaryValueProblem, systems: Sequence[PatchSystem], is_loose: bool) -> None:
     """Raise ValueError where a region has no area, and where a part of a body that is not loose is free to move."""
     space, volumes = systems[0].space, [system.volume for system in systems]
     demand_area(problem, [face for system in systems for face in system.weak], space, volumes)

@@ -11,7 +11,7 @@ from parameterize.blocks.layout import LayoutError, block_layout
 from parameterize.certificate.body import certify
 from parameterize.certificate.boundary import check_boundary
 from parameterize.skeleton.graph import Skeleton
-from parameterize.spline.multipatch import MultiPatch
+from parameterize.spline.body import Body as SplineBody
 
 HUB, X, Y, Z = np.zeros(3), *np.eye(3)
 
@@ -57,7 +57,7 @@ def start(request):
 
 def test_a_start_is_right_handed_inside_the_body_and_of_its_genus(start):
     layout, vertices, faces, skeleton = start
-    body = MultiPatch(tuple(block.spline for block in layout.blocks), layout.interfaces)
+    body = SplineBody(tuple(block.spline for block in layout.blocks), layout.interfaces)
     certificate = certify(body)
     assert certificate.verdict == "certified" and not any(patch.left_handed for patch in certificate.patches)
     assert check_boundary(body).injective

@@ -14,7 +14,7 @@ from parameterize.blocks.rows import with_rows
 from parameterize.blocks.strips import Crossing, Cuts, divided
 from parameterize.certificate.body import certify
 from parameterize.certificate.boundary import check_boundary
-from parameterize.spline.multipatch import MultiPatch
+from parameterize.spline.body import Body as SplineBody
 
 X, Y, Z = np.eye(3)
 
@@ -70,7 +70,7 @@ def test_limbs_that_part_at_once_have_no_row(name):
 def test_the_flat_part_is_cut_into_a_strip_for_each_finger(others):
     skeleton, vertices, faces = hand(*others)
     layout = block_layout(skeleton, vertices, faces)
-    body = MultiPatch(tuple(block.spline for block in layout.blocks), layout.interfaces)
+    body = SplineBody(tuple(block.spline for block in layout.blocks), layout.interfaces)
     certificate = certify(body)
     assert certificate.verdict == "certified" and not any(patch.left_handed for patch in certificate.patches)
     assert check_boundary(body).injective

@@ -5,9 +5,9 @@ import pytest
 from patches import SYMMETRIES, cells, frame, patch, plate_with_hole, ring, turned
 
 from parameterize.certificate.body import certify
+from parameterize.spline.body import Body
 from parameterize.spline.bspline import open_uniform_knots
 from parameterize.spline.interface import Interface
-from parameterize.spline.multipatch import MultiPatch
 from parameterize.spline.volume import FACE_NAMES, BSplineVolume
 
 LEFT = patch(lambda u, v, w: (u, v + 0.1 * u * w, w))
@@ -24,11 +24,11 @@ def folded_back(u, v, w):
 @pytest.mark.parametrize("symmetry", SYMMETRIES)
 def test_two_patches_glued_in_every_orientation(symmetry):
     """The second patch is left-handed in half of them; the same patch laid back over the first is never taken."""
-    good = MultiPatch.from_patches([LEFT, turned(patch(beside), symmetry)])
+    good = Body.from_patches([LEFT, turned(patch(beside), symmetry)])
     found = certify(good)
     assert len(good.interfaces) == 1 and found.verdict == "certified" and found.misglued == ()
     assert found.volume == pytest.approx(2.0)
-    bad = MultiPatch.from_patches([LEFT, turned(patch(folded_back), symmetry)])
+    bad = Body.from_patches([LEFT, turned(patch(folded_back), symmetry)])
     found = certify(bad)
     assert {one.verdict for one in found.patches} == {"certified"}
     assert found.verdict == "folded" and found.misglued == bad.interfaces
@@ -43,11 +43,11 @@ def test_half_of_the_orientations_are_left_handed():
 @pytest.mark.parametrize(
     ("body", "volume", "relative"),
     [
-        (MultiPatch.from_patches(cells([(0, 0, 0), (1, 0, 0), (0, 1, 0)])), 3.0, 1e-12),
+        (Body.from_patches(cells([(0, 0, 0), (1, 0, 0), (0, 1, 0)])), 3.0, 1e-12),
         (frame(), 20.0, 1e-12),
         (plate_with_hole(9), 4.0 - np.pi / 4.0, 2e-5),
-        (MultiPatch.from_patches([patch(ring(0, 1), (24, 4, 4))]), 0.36 * 2.0 * np.pi, 1e-4),
-        (MultiPatch.from_patches([patch(ring(k / 4, (k + 1) / 4), (9, 4, 4)) for k in range(4)]), 0.72 * np.pi, 1e-4),
+        (Body.from_patches([patch(ring(0, 1), (24, 4, 4))]), 0.36 * 2.0 * np.pi, 1e-4),
+        (Body.from_patches([patch(ring(k / 4, (k + 1) / 4), (9, 4, 4)) for k in range(4)]), 0.72 * np.pi, 1e-4),
     ],
 )
 def test_good_bodies(body, volume, relative):
@@ -59,16 +59,16 @@ def test_good_bodies(body, volume, relative):
 
 
 def test_a_volume_is_certified_as_the_only_patch_of_a_body():
-    alone, among = certify(LEFT), certify(MultiPatch((LEFT,))).patches[0]
+    alone, among = certify(LEFT), certify(Body((LEFT,))).patches[0]
     assert (alone.verdict, alone.lower_bound, alone.mean_det) == (among.verdict, among.lower_bound, among.mean_det)
 
 
 def test_a_patch_laid_upon_its_copy_is_folded_at_every_face():
     """All six faces would leave no boundary; one of them is left out."""
     with pytest.raises(ValueError, match="every face is glued"):
-        MultiPatch.from_patches([LEFT, LEFT])
+        Body.from_patches([LEFT, LEFT])
     glued = tuple(Interface((0, name), (1, name)) for name in FACE_NAMES[1:])
-    found = certify(MultiPatch((LEFT, LEFT), glued))
+    found = certify(Body((LEFT, LEFT), glued))
     assert found.verdict == "folded" and found.misglued == glued
 
 
@@ -76,7 +76,7 @@ def test_a_fold_is_named_by_its_patch_and_place():
     good = cells([(0, 0, 0), (1, 0, 0), (2, 0, 0)], 4, 3)
     points = good[2].control_points.copy()
     points[1:3, 1:3, 1:3, 0] -= 3.0  # the inner control points, pulled through the second patch
-    body = MultiPatch.from_patches([*good[:2], BSplineVolume(good[2].degrees, good[2].knots, points)])
+    body = Body.from_patches([*good[:2], BSplineVolume(good[2].degrees, good[2].knots, points)])
     found = certify(body)
     assert [one.verdict for one in found.patches] == ["certified", "certified", "folded"]
     assert found.verdict == "folded" and found.misglued == () and found.lower_bound < 0.0
@@ -92,7 +92,7 @@ def test_what_is_not_proved_is_named_by_patch():
     rows = np.linspace(0.0, 1.0, 4)
     points = np.stack(np.meshgrid(1.0 + rows, rows, heights, indexing="ij"), axis=-1)
     first = points - [1.0, 0.0, 0.0]
-    body = MultiPatch.from_patches([BSplineVolume((3, 3, 3), (knots,) * 3, net) for net in (first, points)])
+    body = Body.from_patches([BSplineVolume((3, 3, 3), (knots,) * 3, net) for net in (first, points)])
     found = certify(body)
     assert found.verdict == "undecided" and len(body.interfaces) == 1
     flat = "det J is zero, up to rounding, at (0.5, 0, 0.5)"
@@ -102,7 +102,7 @@ def test_what_is_not_proved_is_named_by_patch():
 def test_an_interface_of_a_patch_that_is_not_certified_is_not_judged():
     points = patch(folded_back).control_points.copy()
     points[1:3, 1:3, 1:3, 0] += 3.0
-    body = MultiPatch.from_patches([LEFT, BSplineVolume.uniform(points)])
+    body = Body.from_patches([LEFT, BSplineVolume.uniform(points)])
     found = certify(body)
     assert found.patches[1].verdict == "folded" and found.misglued == () and found.verdict == "folded"
 

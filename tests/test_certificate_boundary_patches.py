@@ -7,8 +7,8 @@ from volumes import bent
 
 from parameterize.certificate.body import certify
 from parameterize.certificate.boundary import check_boundary
+from parameterize.spline.body import Body
 from parameterize.spline.interface import Interface
-from parameterize.spline.multipatch import MultiPatch
 from parameterize.spline.volume import BSplineVolume
 
 QUARTERS = [(k / 4, (k + 1) / 4) for k in range(4)]
@@ -17,13 +17,13 @@ QUARTERS = [(k / 4, (k + 1) / 4) for k in range(4)]
 @pytest.mark.parametrize(
     "body",
     [
-        MultiPatch.from_patches(cells([(0, 0, 0), (1, 0, 0), (0, 1, 0)])),
+        Body.from_patches(cells([(0, 0, 0), (1, 0, 0), (0, 1, 0)])),
         frame(),
         plate_with_hole(),
-        MultiPatch.from_patches([patch(ring(0, 1), (24, 4, 4))]),
-        MultiPatch.from_patches([patch(ring(0, 1), (4, 4, 4))]),
-        MultiPatch.from_patches([patch(ring(*part)) for part in QUARTERS]),
-        MultiPatch.from_patches([patch(ring(0.0, 0.4), 6), patch(ring(0.4, 0.8), 6)]),
+        Body.from_patches([patch(ring(0, 1), (24, 4, 4))]),
+        Body.from_patches([patch(ring(0, 1), (4, 4, 4))]),
+        Body.from_patches([patch(ring(*part)) for part in QUARTERS]),
+        Body.from_patches([patch(ring(0.0, 0.4), 6), patch(ring(0.4, 0.8), 6)]),
         around_a_line(4),
     ],
     ids=["L", "frame", "plate", "ring", "ring of one span", "ring of four", "open ring", "turn around a line"],
@@ -38,7 +38,7 @@ def test_good_bodies_are_injective(body):
 def test_the_orientation_of_a_patch_changes_nothing(symmetry):
     pieces = [patch(ring(*part), (6, 4, 5)) for part in QUARTERS]
     pieces[1] = turned(pieces[1], symmetry)
-    assert check_boundary(MultiPatch.from_patches(pieces)).injective is True
+    assert check_boundary(Body.from_patches(pieces)).injective is True
 
 
 def test_patches_of_other_degrees_and_knots():
@@ -46,7 +46,7 @@ def test_patches_of_other_degrees_and_knots():
     knots = (np.array([0.0, 0.0, 0.3, 1.0, 1.0]), *straight.knots[1:])
     wide = BSplineVolume((1, 2, 2), knots, np.zeros((3, *straight.shape[1:], 3)))
     wide.control_points[:] = straight.control_points[-1] + np.array([0.0, 0.4, 1.0])[:, None, None, None] * [1, 0, 0]
-    body = MultiPatch.from_patches([straight, wide])
+    body = Body.from_patches([straight, wide])
     assert len(body.interfaces) == 1 and check_boundary(body).injective is True
 
 
@@ -57,7 +57,7 @@ def test_patches_that_overlap_away_from_their_interfaces(turns, rise, injective)
         patch(ring(k * turns / 3, (k + 1) * turns / 3, lift=lambda angle: rise * angle / (2.0 * np.pi)), (8, 4, 4))
         for k in range(3)
     ]
-    body = MultiPatch.from_patches(parts)
+    body = Body.from_patches(parts)
     assert len(body.interfaces) == 2 and certify(body).verdict == "certified"
     found = check_boundary(body)
     assert found.injective is injective
@@ -70,7 +70,7 @@ def test_patches_that_overlap_away_from_their_interfaces(turns, rise, injective)
 def test_a_meeting_names_its_patches():
     arm = patch(lambda u, v, w: (3.0 - 4.0 * u, v * 0.5 + 0.2, 0.4 + 0.3 * w))  # back through the first patch
     bars = cells([(0, 0, 0), (1, 0, 0)], 4, 3)
-    found = check_boundary(MultiPatch.from_patches([*bars, arm]))
+    found = check_boundary(Body.from_patches([*bars, arm]))
     assert found.injective is False and 2 in found.meeting.patches
     first, second = found.meeting.patches
     assert f"parameters p{first} (" in str(found.meeting) and f") and p{second} (" in str(found.meeting)
@@ -82,7 +82,7 @@ def test_a_meeting_names_its_patches():
 @pytest.mark.parametrize("shrink", [0.0, 0.2])
 def test_a_ring_that_winds_twice(shrink):
     """det J > 0 everywhere and both traces agree, but the boundary passes through itself."""
-    body = MultiPatch.from_patches([patch(ring(0, 2, lambda angle: 1.5 + shrink * np.cos(angle / 2.0)), (36, 4, 4))])
+    body = Body.from_patches([patch(ring(0, 2, lambda angle: 1.5 + shrink * np.cos(angle / 2.0)), (36, 4, 4))])
     assert len(body.interfaces) == 1 and certify(body).verdict == "certified"
     assert check_boundary(body).injective is False
 
@@ -94,8 +94,8 @@ def test_a_ring_that_lies_twice_in_the_same_place():
     points[-1] = points[0]
     turn = BSplineVolume(turn.degrees, turn.knots, points)
     glued = Interface((0, "u1"), (1, "u0")), Interface((1, "u1"), (0, "u0"))
-    assert certify(MultiPatch((turn, turn), glued)).verdict == "certified"
-    assert check_boundary(MultiPatch((turn, turn), glued), max_depth=3).injective is not True
+    assert certify(Body((turn, turn), glued)).verdict == "certified"
+    assert check_boundary(Body((turn, turn), glued), max_depth=3).injective is not True
 
 
 def test_a_line_with_two_turns_around_it():
@@ -109,14 +109,14 @@ def test_a_line_with_two_turns_around_it():
 @pytest.mark.parametrize("symmetry", SYMMETRIES[::7])
 def test_a_patch_folded_back_over_its_neighbour(symmetry):
     back = turned(patch(lambda u, v, w: (1.0 - 0.5 * u, v, w)), symmetry)
-    body = MultiPatch.from_patches([patch(lambda u, v, w: (u, v, w)), back])
+    body = Body.from_patches([patch(lambda u, v, w: (u, v, w)), back])
     assert check_boundary(body, max_depth=4).injective is not True
 
 
 def test_patches_that_touch_along_an_edge_without_an_interface_meet():
-    found = check_boundary(MultiPatch.from_patches(cells([(0, 0, 0), (1, 1, 0)])))
+    found = check_boundary(Body.from_patches(cells([(0, 0, 0), (1, 1, 0)])))
     assert found.injective is not True
-    joined = check_boundary(MultiPatch.from_patches(cells([(0, 0, 0), (1, 0, 0), (1, 1, 0)])))
+    joined = check_boundary(Body.from_patches(cells([(0, 0, 0), (1, 0, 0), (1, 1, 0)])))
     assert joined.injective is True
 
 
@@ -124,7 +124,7 @@ def test_patches_that_touch_along_an_edge_without_an_interface_meet():
 def test_a_plate_cut_open_beside_its_hole(gap):
     """The last sector ends short of the first one, or past it."""
     sectors = [patch(sector(k, k + 1), 6) for k in range(7)] + [patch(sector(7.0, 8.0 - gap), 6)]
-    body = MultiPatch.from_patches(sectors)
+    body = Body.from_patches(sectors)
     assert len(body.interfaces) == 7
     assert check_boundary(body).injective is (gap > 0.0)
 
@@ -141,13 +141,13 @@ def test_a_slit_between_curved_walls(gap, bend):
 def test_the_answer_depends_neither_on_units_nor_on_the_place(factor, offset):
     for turns, injective in ((1.0, True), (1.02, False)):
         parts = [patch(ring(k * turns / 4, (k + 1) * turns / 4), (6, 4, 4)) for k in range(4)]
-        body = MultiPatch.from_patches(parts)
+        body = Body.from_patches(parts)
         moved = tuple(part.transformed(factor, np.full(3, offset)) for part in body)
-        assert check_boundary(MultiPatch(moved, body.interfaces)).injective is injective
+        assert check_boundary(Body(moved, body.interfaces)).injective is injective
 
 
 def test_a_body_without_a_boundary_is_refused():
     point = BSplineVolume.uniform(np.zeros((2, 2, 2, 3)), degree=1)
     glued = tuple(Interface((0, f"{name}0"), (0, f"{name}1")) for name in "uvw")
     with pytest.raises(ValueError, match="every face is glued"):
-        MultiPatch((point,), glued)
+        Body((point,), glued)

@@ -9,7 +9,7 @@ from rational_shapes import bent_bar, coil, octant, quarter_ring
 from parameterize.certificate.boundary import check_boundary
 from parameterize.certificate.patch_proofs import _differences
 from parameterize.spline.bernstein import binomials
-from parameterize.spline.multipatch import MultiPatch
+from parameterize.spline.body import Body
 from parameterize.spline.rational import homogeneous
 from parameterize.spline.volume import BSplineVolume
 
@@ -62,8 +62,8 @@ def test_a_half_ring_of_two_patches_is_proved_and_a_ring_of_four():
     ring = quarter_ring()
     turn = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
     quarters = [replace(ring, control_points=ring.control_points @ np.linalg.matrix_power(turn, k)) for k in range(4)]
-    assert check_boundary(MultiPatch.from_patches(quarters[:2])).injective is True
-    body = MultiPatch.from_patches(quarters)
+    assert check_boundary(Body.from_patches(quarters[:2])).injective is True
+    body = Body.from_patches(quarters)
     assert len(body.interfaces) == 4 and check_boundary(body).injective is True
 
 

@@ -6,22 +6,22 @@ from patches import SYMMETRIES, around_a_line, frame, patch, plate_with_hole, ri
 
 from parameterize.certificate.gluing import on_one_side
 from parameterize.certificate.patch_proofs import boundary_pieces, halved
+from parameterize.spline.body import Body
 from parameterize.spline.interface import axis_side
-from parameterize.spline.multipatch import MultiPatch
 from parameterize.spline.volume import BSplineVolume
 
 
 def mixed(body, seed):
     """The same body, the parameters of each patch exchanged and reversed at random."""
     ways = np.random.default_rng(seed).integers(len(SYMMETRIES), size=len(body))
-    return MultiPatch.from_patches([turned(one, SYMMETRIES[way]) for one, way in zip(body, ways, strict=True)])
+    return Body.from_patches([turned(one, SYMMETRIES[way]) for one, way in zip(body, ways, strict=True)])
 
 
 BODIES = {
     "plate": plate_with_hole(5),
     "frame": frame(),
-    "ring": MultiPatch.from_patches([patch(ring(0, 1), (6, 4, 4))]),
-    "ring of four": MultiPatch.from_patches([patch(ring(k / 4, (k + 1) / 4)) for k in range(4)]),
+    "ring": Body.from_patches([patch(ring(0, 1), (6, 4, 4))]),
+    "ring of four": Body.from_patches([patch(ring(k / 4, (k + 1) / 4)) for k in range(4)]),
 }
 
 
@@ -63,9 +63,7 @@ def test_sides_of_an_interface_are_those_of_the_derivatives_across(second):
     rng = np.random.default_rng(0)
     for _ in range(60):
         ways = [SYMMETRIES[k] for k in rng.integers(len(SYMMETRIES), size=2)]
-        body = MultiPatch.from_patches(
-            [turned(one, way) for one, way in zip((first, patch(second)), ways, strict=True)]
-        )
+        body = Body.from_patches([turned(one, way) for one, way in zip((first, patch(second)), ways, strict=True)])
         (interface,) = body.interfaces
         signs = [int(np.sign(np.linalg.det(one.jacobian([[0.5, 0.5, 0.5]])[0]))) for one in body]
         a, b = (outward(body.patches[k], face) for k, face in (interface.first, interface.second))
@@ -79,5 +77,5 @@ def test_faces_of_one_patch_that_turn_around_a_line():
     mirrored = [
         BSplineVolume(one.degrees, one.knots, one.control_points * [-1.0, 1.0, 1.0]) for one in around_a_line(4)
     ]
-    for interface in MultiPatch(tuple(mirrored), around_a_line(4).interfaces).interfaces:
+    for interface in Body(tuple(mirrored), around_a_line(4).interfaces).interfaces:
         assert not on_one_side(interface, [-1] * 4)

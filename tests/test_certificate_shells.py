@@ -6,7 +6,7 @@ from patches import cells, grid, met_twice, patch
 
 from parameterize.certificate.body import certify
 from parameterize.certificate.boundary import check_boundary
-from parameterize.spline.multipatch import MultiPatch
+from parameterize.spline.body import Body
 
 HOLLOW = [place for place in grid(3, 3, 3).tolist() if place != [1, 1, 1]]
 
@@ -16,7 +16,7 @@ def box(low, size):
 
 
 def test_a_void_is_a_shell_that_faces_inward():
-    body = MultiPatch.from_patches(cells(HOLLOW))
+    body = Body.from_patches(cells(HOLLOW))
     assert certify(body).verdict == "certified"
     found = check_boundary(body)
     assert found.injective is True and found.overlap is False
@@ -24,7 +24,7 @@ def test_a_void_is_a_shell_that_faces_inward():
 
 def test_two_voids():
     places = [place for place in grid(5, 3, 3).tolist() if place not in ([1, 1, 1], [3, 1, 1])]
-    assert check_boundary(MultiPatch.from_patches(cells(places))).injective is True
+    assert check_boundary(Body.from_patches(cells(places))).injective is True
 
 
 def test_a_body_that_covers_a_place_twice_between_two_shells():
@@ -40,26 +40,26 @@ def test_a_body_that_covers_a_place_twice_between_two_shells():
 
 
 def test_two_bodies_beside_each_other():
-    assert check_boundary(MultiPatch((box(0.0, 1.0), box(1.5, 1.0)))).injective is True
+    assert check_boundary(Body((box(0.0, 1.0), box(1.5, 1.0)))).injective is True
 
 
 def test_a_body_inside_another_one():
-    found = check_boundary(MultiPatch((box(0.0, 3.0), box(1.0, 1.0))))
+    found = check_boundary(Body((box(0.0, 3.0), box(1.0, 1.0))))
     assert found.injective is False and found.overlap is True and found.undecided == 0
 
 
 def test_a_body_in_the_void_of_another_one():
-    assert check_boundary(MultiPatch.from_patches([*cells(HOLLOW), box(1.2, 0.6)])).injective is True
+    assert check_boundary(Body.from_patches([*cells(HOLLOW), box(1.2, 0.6)])).injective is True
 
 
 def test_a_body_around_the_void_of_another_one():
     """Neither body contains the other: one has a void, which the other one fills, and more around it."""
     places = [place for place in grid(5, 5, 5).tolist() if place != [2, 2, 2]]
-    assert check_boundary(MultiPatch.from_patches([*cells(places), box(1.5, 2.0)])).injective is False
+    assert check_boundary(Body.from_patches([*cells(places), box(1.5, 2.0)])).injective is False
 
 
 def test_a_body_in_the_corner_of_an_angle():
     """The second body lies within the box around the first one."""
     angle = cells([[0, 0, 0], [1, 0, 0], [0, 1, 0]])
     moved = patch(lambda u, v, w: (1.25 + 0.5 * u, 1.25 + 0.5 * v, 0.25 + 0.5 * w))
-    assert check_boundary(MultiPatch.from_patches([*angle, moved])).injective is True
+    assert check_boundary(Body.from_patches([*angle, moved])).injective is True

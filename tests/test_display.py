@@ -68,15 +68,15 @@ def test_a_certificate_and_a_quality_say_what_is_proved():
 
 
 def test_a_certificate_of_several_patches_lists_its_defects():
-    good = iga_nn.MultiPatch((benchmark_volume(2), benchmark_volume(3)))
+    good = iga_nn.Body((benchmark_volume(2), benchmark_volume(3)))
     shown = iga_nn.certify(good)._repr_html_()
     assert "2 patches: certified" in shown and "<ul>" not in shown
-    folded = iga_nn.certify(iga_nn.MultiPatch((benchmark_volume(2), benchmark_volume(4, amplitude=0.4))))
+    folded = iga_nn.certify(iga_nn.Body((benchmark_volume(2), benchmark_volume(4, amplitude=0.4))))
     assert "2 patches: folded" in folded._repr_html_() and "<li>p1: folded at (" in folded._repr_html_()
 
 
 def test_a_body_and_a_solution_on_it_have_tables():
-    body = iga_nn.MultiPatch.from_patches(boxes([(0, 0, 0), (1, 0, 0)], 3, 2))
+    body = iga_nn.Body.from_patches(boxes([(0, 0, 0), (1, 0, 0)], 3, 2))
     found = cells(body._repr_html_())
     assert found == [
         "patches", "2", "interfaces", "1", "outer faces", "10", "control points", "45", "lies within",
@@ -87,7 +87,7 @@ def test_a_body_and_a_solution_on_it_have_tables():
 
 
 def test_the_quality_of_several_patches_has_a_row_for_each():
-    body = iga_nn.MultiPatch.from_patches(boxes([(0, 0, 0), (1, 0, 0)], 4, 3))
+    body = iga_nn.Body.from_patches(boxes([(0, 0, 0), (1, 0, 0)], 4, 3))
     outer = outer_surface(body)
     quality = measure(body, outer.vertices, outer.faces, 0.5, outer, iga_nn.certify(body), check_boundary(body))
     shown = quality._repr_html_()

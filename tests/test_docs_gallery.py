@@ -16,9 +16,7 @@ def cube(shift):
     return iga_nn.BSplineVolume.from_function(lambda u, v, w: (u + shift, v, w), control_points=4)
 
 
-@pytest.mark.parametrize(
-    "body", [cube(0.0), iga_nn.MultiPatch.from_patches([cube(0.0), cube(1.0)])], ids=["one", "two"]
-)
+@pytest.mark.parametrize("body", [cube(0.0), iga_nn.Body.from_patches([cube(0.0), cube(1.0)])], ids=["one", "two"])
 def test_a_view_shows_the_solution(tmp_path, body):
     left, pictures = tmp_path / "examples" / "out" / "box", tmp_path / "examples" / "pictures"
     left.mkdir(parents=True)

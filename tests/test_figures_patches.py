@@ -72,7 +72,7 @@ def test_without_a_patch_the_face_behind_it_is_seen():
 
 
 def test_the_half_beyond_a_plane_is_left_out():
-    rod = iga_nn.MultiPatch.from_patches(
+    rod = iga_nn.Body.from_patches(
         [iga_nn.BSplineVolume.from_function(lambda u, v, w, a=a: (a + u, v, w), 4) for a in range(3)]
     )
     left_out = cutaway.beyond(fields.points_of(rod), np.array([1.0, 0.0, 0.0]))
@@ -89,7 +89,7 @@ def test_each_patch_has_a_colour_and_many_share_them():
 def test_distortion_measures_each_patch_in_its_own_box():
     """A cube and a rod are not distorted, and no size of the body makes them so."""
     parts = [iga_nn.BSplineVolume.from_function(lambda u, v, w, a=a: (a * u, v, a * w), 4) for a in (1.0, -3.0)]
-    field = fields.distortion_of(iga_nn.MultiPatch(tuple(parts)))
+    field = fields.distortion_of(iga_nn.Body(tuple(parts)))
     assert max(values.max() for values in field.everywhere) < 1e-6 and "each in its own box" in field.title
 
 

@@ -11,7 +11,7 @@ from parameterize.handles.cutting import without_handles
 from parameterize.handles.layout import ACROSS, footprint, stub_layout
 from parameterize.handles.pieces import handles_of
 from parameterize.skeleton.solid import skeleton_of
-from parameterize.spline.multipatch import MultiPatch
+from parameterize.spline.body import Body as SplineBody
 from parameterize.spline.volume import BSplineVolume
 from parameterize.surface.geometry import signed_volume
 from parameterize.surface.topology import genus_of
@@ -70,5 +70,5 @@ def test_stubs_are_glued_to_whole_faces_and_the_body_stays_as_it_is(body):
     assert all((k, end) in glued for k in range(2) for end in ("w0", "w1"))
     corner = volume([[0.0, 0.0, 0.0]])[0]
     assert np.array_equal(parts[0]([[0.0, 0.0, 0.0]])[0], corner)
-    solid = MultiPatch(tuple(block.spline for block in layout.blocks), layout.interfaces)
+    solid = SplineBody(tuple(block.spline for block in layout.blocks), layout.interfaces)
     assert check_boundary(solid).injective is not False

@@ -19,8 +19,8 @@ from iga_nn.cli.commands import main
 from iga_nn.errors import InputError
 from iga_nn.io.formats import export, is_volume, load_volume
 from parameterize.spline.bernstein import binomials, elevation
+from parameterize.spline.body import Body
 from parameterize.spline.bspline import open_uniform_knots
-from parameterize.spline.multipatch import MultiPatch
 from parameterize.spline.orientation import orientation
 from parameterize.spline.volume import BSplineVolume
 from solve import Poisson, solve_problem
@@ -326,7 +326,7 @@ def edited(to, old, new, count=1):
     """The text of a file of a cube with something replaced."""
     cube = BSplineVolume.uniform(np.stack(np.indices((2, 2, 2)), axis=-1), degree=1)
     if to == "geopdes":
-        text = geopdes(MultiPatch((cube,)))
+        text = geopdes(Body((cube,)))
     else:
         cube.save("cube.npz")
         text = export("cube.npz", to, force=True).read_text()

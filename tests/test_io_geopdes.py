@@ -119,10 +119,10 @@ def orientation_in(text, number):
 def test_models_of_geopdes_open_with_the_interfaces_and_orientations_that_they_list(name, patches, interfaces):
     for path in patch_files(name):
         text = path.read_text()
-        body = iga_nn.MultiPatch.from_patches(read_geopdes(text)[0])
+        body = iga_nn.Body.from_patches(read_geopdes(text)[0])
         assert (len(body), len(body.interfaces)) == (patches, interfaces)
         assert set(body.interfaces) == {orientation_in(text, number + 1) for number in range(interfaces)}
-        assert isinstance(iga_nn.load_volume(path), iga_nn.BSplineVolume if patches == 1 else iga_nn.MultiPatch)
+        assert isinstance(iga_nn.load_volume(path), iga_nn.BSplineVolume if patches == 1 else iga_nn.Body)
 
 
 CUBE = ("0 1 0 1 0 1 0 1", "0 0 1 1 0 0 1 1", "0 0 0 0 1 1 1 1", "1 1 1 1 1 1 1 1")

@@ -169,11 +169,11 @@ def test_files_without_a_body_are_refused(content, says, in_folder):
 @pytest.mark.parametrize(("name", "patches", "interfaces"), [("fichera.xml", 7, 9), ("GshapedVolume.xml", 1, 0)])
 def test_models_of_gismo_open(name, patches, interfaces, tmp_path):
     for path in patch_files(name):
-        read = iga_nn.MultiPatch.from_patches(read_gismo(path.read_text())[0])
+        read = iga_nn.Body.from_patches(read_gismo(path.read_text())[0])
         assert (len(read), len(read.interfaces)) == (patches, interfaces)
         write_gismo(tmp_path / "again.xml", read)
-        assert isinstance(iga_nn.load_volume(path), iga_nn.BSplineVolume if patches == 1 else iga_nn.MultiPatch)
-        demand_same(iga_nn.MultiPatch.from_patches(read_gismo((tmp_path / "again.xml").read_text())[0]), read)
+        assert isinstance(iga_nn.load_volume(path), iga_nn.BSplineVolume if patches == 1 else iga_nn.Body)
+        demand_same(iga_nn.Body.from_patches(read_gismo((tmp_path / "again.xml").read_text())[0]), read)
 
 
 @pytest.mark.parametrize("name", ["file.xml.gz", "file.xml"])

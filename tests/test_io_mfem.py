@@ -15,7 +15,7 @@ from volumes import spans_at
 
 import iga_nn
 from iga_nn.io.mfem import read_mfem
-from parameterize.spline.multipatch import as_multipatch
+from parameterize.spline.body import as_body
 from parameterize.spline.orientation import orientation
 
 CORNER = [(0, 0, 0), (1, 0, 0), (1, 1, 0)]
@@ -41,7 +41,7 @@ def body(request, in_folder):
 def upright(body):
     """The body as its mesh holds it: w is reversed in patches that are left-handed."""
     patches = [turned(patch, back=(False, False, orientation(patch) < 0)) for patch in body]
-    return iga_nn.MultiPatch.from_patches(patches)
+    return iga_nn.Body.from_patches(patches)
 
 
 def in_mfem(path, body):
@@ -114,7 +114,7 @@ def test_a_moebius_strip_is_refused(in_folder):
 def test_weights_in_proportion_have_no_place(in_folder):
     body = exact_ring()
     doubled = [replace(patch, weights=(1 + number % 2) * patch.weights) for number, patch in enumerate(body)]
-    iga_nn.MultiPatch.from_patches(doubled).save("ring.npz")
+    iga_nn.Body.from_patches(doubled).save("ring.npz")
     with pytest.raises(iga_nn.InputError, match="multiply the weights of one by their ratio"):
         iga_nn.export("ring.npz", "mfem")
 
@@ -167,7 +167,7 @@ def test_neighbours_with_other_numbers_of_control_points_are_refused(in_folder):
 
 
 def demand_alike(path, patches, interfaces):
-    body = iga_nn.MultiPatch.from_patches(list(as_multipatch(iga_nn.load_volume(path))))
+    body = iga_nn.Body.from_patches(list(as_body(iga_nn.load_volume(path))))
     assert (len(body), len(body.interfaces)) == (patches, interfaces)
     found, _ = in_mfem(path, body)
     assert np.abs(found - [patch(POINTS) for patch in body]).max() < 1e-12
@@ -203,8 +203,8 @@ def uneven(place, turn):
 
 TWO_WAYS = [((0, 1, 2), (False, False, False)), ((2, 0, 1), (True, True, False)), ((0, 1, 2), (True, True, False))]
 UNEVEN = {
-    "corner": iga_nn.MultiPatch.from_patches(list(map(uneven, CORNER, TWO_WAYS))),
-    "block": iga_nn.MultiPatch.from_patches(list(map(uneven, BLOCK, (TWO_WAYS * 3)[:8]))),
+    "corner": iga_nn.Body.from_patches(list(map(uneven, CORNER, TWO_WAYS))),
+    "block": iga_nn.Body.from_patches(list(map(uneven, BLOCK, (TWO_WAYS * 3)[:8]))),
 }
 
 

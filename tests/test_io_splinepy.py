@@ -18,8 +18,8 @@ BODIES = [CORNER, ring(3), ring(1)]
 @pytest.mark.parametrize("body", BODIES, ids=["corner", "three", "ring"])
 def test_a_body_is_a_multipatch_and_back(body):
     patches = body.to_splinepy()
-    demand_same(iga_nn.MultiPatch.from_splinepy(patches), body)
-    demand_same(iga_nn.MultiPatch.from_splinepy(list(patches.patches)), body)
+    demand_same(iga_nn.Body.from_splinepy(patches), body)
+    demand_same(iga_nn.Body.from_splinepy(list(patches.patches)), body)
     for spline, patch in zip(patches.patches, body, strict=True):
         assert np.abs(spline.evaluate(POINTS) - patch(POINTS)).max() < 1e-14
 
@@ -44,10 +44,10 @@ def test_a_list_in_json_is_read_again(body, in_folder):
 def test_rational_patches_are_nurbs():
     patches = exact_ring().to_splinepy()
     assert {spline.name for spline in patches.patches} == {"NURBS"}
-    assert len(iga_nn.MultiPatch.from_splinepy(patches).interfaces) == 4
+    assert len(iga_nn.Body.from_splinepy(patches).interfaces) == 4
 
 
 @pytest.mark.parametrize("other", [3, [3], [np.zeros(3)]])
 def test_other_objects_are_refused(other):
     with pytest.raises(TypeError, match="must be"):
-        iga_nn.MultiPatch.from_splinepy(other)
+        iga_nn.Body.from_splinepy(other)

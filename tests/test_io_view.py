@@ -148,5 +148,5 @@ def test_distortion_is_that_of_a_cube_of_volume_1_or_of_the_boxes_of_several_pat
     scale = 4.0 ** (-1.0 / 3.0)
     expected = (4.0 * scale - 1.0) ** 2 + 2.0 * (scale - 1.0) ** 2
     assert view.grid(rod, samples=1).point_data["arap"] == pytest.approx(expected)
-    both = iga_nn.MultiPatch.from_patches([rod, BSplineVolume.from_function(lambda u, v, w: (4.0 + u, v, w), 4)])
+    both = iga_nn.Body.from_patches([rod, BSplineVolume.from_function(lambda u, v, w: (4.0 + u, v, w), 4)])
     assert np.abs(view.grid(both, samples=1).point_data["arap"]).max() < 1e-20

@@ -7,7 +7,7 @@ from rational_shapes import bent_bar, octant, quarter_ring
 from test_io_formats import POINTS, cell_values, largest, read_vtu
 
 from iga_nn.io.vtk import write_bezier
-from parameterize.spline.multipatch import MultiPatch
+from parameterize.spline.body import Body
 from parameterize.spline.orientation import mirrored
 from solve import Elasticity, Poisson, solve_problem
 
@@ -37,7 +37,7 @@ def test_patches_share_points_of_the_same_weight(factor, points, tmp_path):
     from vtkmodules.vtkCommonCore import reference
 
     outer = quarter_ring(2.0, 3.0)
-    body = MultiPatch.from_patches([quarter_ring(), replace(outer, weights=factor * outer.weights)])
+    body = Body.from_patches([quarter_ring(), replace(outer, weights=factor * outer.weights)])
     write_bezier(tmp_path / "body.vtu", body)
     grid = read_vtu(tmp_path / "body.vtu")
     assert grid.GetNumberOfPoints() == points

@@ -17,7 +17,7 @@ def bent(a=0.0, b=1.5, n=5, degree=2):
 
 def ring():
     """One patch that is glued to itself."""
-    return iga_nn.MultiPatch.from_patches([bent(0.0, 2.0 * np.pi, 9)])
+    return iga_nn.Body.from_patches([bent(0.0, 2.0 * np.pi, 9)])
 
 
 LAWS = {
@@ -28,7 +28,7 @@ LAWS = {
 
 
 @pytest.mark.parametrize("law", LAWS.values(), ids=LAWS)
-@pytest.mark.parametrize("make", [bent, ring, lambda: iga_nn.MultiPatch.from_patches([bent(), bent(1.5, 2.5, 4)])])
+@pytest.mark.parametrize("make", [bent, ring, lambda: iga_nn.Body.from_patches([bent(), bent(1.5, 2.5, 4)])])
 def test_entries_and_factor(law, make):
     system = iga_nn.discretize(make(), law)
     matrix = sparse(system.unknowns, [patch.matrix for patch in system.patches], len(system.right))

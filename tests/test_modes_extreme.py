@@ -10,7 +10,7 @@ from scipy.linalg import eigh
 from scipy.optimize import brentq
 
 import iga_nn
-from iga_nn import BSplineVolume, Elasticity, MultiPatch, Poisson
+from iga_nn import Body, BSplineVolume, Elasticity, Poisson
 from solve import ConvergenceError
 from solve.lowest import Vectors, ritz
 
@@ -58,7 +58,7 @@ def test_a_thin_rod_bends_as_beam_theory_says():
 
 def bars():
     parts = [(0.0, 0.5), (0.5, 1.5)]
-    return MultiPatch.from_patches(
+    return Body.from_patches(
         [
             BSplineVolume.from_function(lambda u, v, w, a=a, b=b: (a + (b - a) * u, v, 0.5 * w), (5, 4, 3), 2)
             for a, b in parts

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import iga_nn
-from iga_nn import BSplineVolume, Elasticity, MultiPatch, Poisson
+from iga_nn import Body, BSplineVolume, Elasticity, Poisson
 from iga_nn.options.analysis import ModesOptions
 from iga_nn.report.document import verdict
 from iga_nn.workflow import pipeline
@@ -102,8 +102,8 @@ def test_hands_and_degrees(degree):
 def test_each_part_has_its_own_motions(supports):
     law = held(**(supports or FREE))
     of_one = {"": 6, "roller": 3, "fix": 0}[next(iter(supports), "")]
-    glued = MultiPatch.from_patches([box(0.0), box(2.0)])
-    apart = MultiPatch.from_patches([box(0.0), box(5.0)])
+    glued = Body.from_patches([box(0.0), box(2.0)])
+    apart = Body.from_patches([box(0.0), box(5.0)])
     assert iga_nn.modes(glued, law, n=1).rigid == of_one
     assert iga_nn.modes(apart, law, n=1).rigid == of_one + (6 if "fix" in supports else of_one)
     warm = iga_nn.modes(apart, Poisson(**OPEN), n=1)
@@ -127,7 +127,7 @@ def test_a_rational_body_turns_in_a_curved_roller():
     """The inner cylinder leaves the shift along its axis and the turn about it; splines contain the latter nearly."""
     how = {"n": 1, "refine": 1, "degree": 2}
     assert iga_nn.modes(quarter(), held(roller="u0"), **how).rigid == 2
-    half = MultiPatch.from_patches([quarter(0.5 * np.pi * k) for k in range(2)])
+    half = Body.from_patches([quarter(0.5 * np.pi * k) for k in range(2)])
     assert iga_nn.modes(half, held(roller="u0"), n=1, degree=2).rigid == 2
     right, left = (iga_nn.modes(quarter(hand=hand), held(**FREE), n=3, refine=2, degree=2) for hand in (1, -1))
     assert right.rigid == left.rigid == 6

@@ -20,7 +20,7 @@ from parameterize.optimization.phases import Polish, Schedule, Separate, Shape, 
 from parameterize.optimization.rounds import optimize
 from parameterize.optimization.term import Weights
 from parameterize.progress import History
-from parameterize.spline.multipatch import MultiPatch
+from parameterize.spline.body import Body
 
 SCHEDULE = Schedule((Shape(), Unfold(), Separate(), Polish(rounds=1)), rounds=6)
 
@@ -43,7 +43,7 @@ def optimised(start, points, faces, schedule=SCHEDULE, steps=5, **options):
 def demand_certified(found):
     """Demand det J > 0 everywhere, no gap, and a boundary that is proved not to meet itself."""
     body = found.spline.body
-    assert isinstance(body, MultiPatch)  # whose interfaces agree bit by bit
+    assert isinstance(body, Body)  # whose interfaces agree bit by bit
     assert found.certificate.verdict == certify(body).verdict == "certified"
     assert found.injective is True and check_boundary(body).injective is True
 

@@ -18,8 +18,8 @@ from parameterize.quality.distances import Distances, nearest_on_boundary
 from parameterize.quality.distortion import arap_grid
 from parameterize.quality.quality import measure
 from parameterize.quality.two_sided import two_sided
+from parameterize.spline.body import Body
 from parameterize.spline.bspline import collocation, greville, open_uniform_knots
-from parameterize.spline.multipatch import MultiPatch
 from parameterize.spline.sampled_boundary import SampledBoundary
 from parameterize.spline.volume import BSplineVolume
 from parameterize.surface.nearest import distance_to_mesh
@@ -211,7 +211,7 @@ def test_scale_must_be_positive(scale):
 def test_a_body_of_patches_by_hand():
     """Two straight bars of 2 x 1 x 1 and 1 x 1 x 1 are not distorted; their surface is moved by 0.1 along z."""
     bars = [from_function(lambda u, v, w: (2.0 * u, v, w)), from_function(lambda u, v, w: (2.0 + w, v, 1.0 - u))]
-    body = MultiPatch.from_patches(bars)
+    body = Body.from_patches(bars)
     outer = outer_surface(body)
     moved = replace(outer, vertices=outer.vertices + [0.0, 0.0, 0.1])
     report = measure(body, moved.vertices, moved.faces, 2.0, moved, certify(body), check_boundary(body))
@@ -238,7 +238,7 @@ def test_a_body_of_patches_by_hand():
 
 def test_the_distortion_of_a_body_is_weighted_by_volume():
     bars = [from_function(lambda u, v, w: (2.0 * u, v, w)), from_function(lambda u, v, w: (2.0 + u, v + u / 2.0, w))]
-    body = MultiPatch.from_patches(bars)
+    body = Body.from_patches(bars)
     outer = outer_surface(body)
     report = measure(body, outer.vertices, outer.faces, 1.0, outer, certify(body), check_boundary(body))
     sheared = report.patches[1].arap
@@ -265,7 +265,7 @@ def surface_arrays(boundary):
 
 
 def test_what_is_no_body_with_its_boundary_is_refused():
-    body = MultiPatch.from_patches([from_function(lambda u, v, w, a=a: (a + u, v, w)) for a in (0, 1)])
+    body = Body.from_patches([from_function(lambda u, v, w, a=a: (a + u, v, w)) for a in (0, 1)])
     outer = outer_surface(body)
     given = (outer.vertices, outer.faces, 1.0)
     with pytest.raises(TypeError, match=r"certificate is not that of this body"):

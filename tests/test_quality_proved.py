@@ -5,9 +5,9 @@ from bodies import ring
 from patches import cells, frame, plate_with_hole
 
 from parameterize.quality.proved import euler_number
-from parameterize.spline.multipatch import MultiPatch
+from parameterize.spline.body import Body
 
-ELL = MultiPatch.from_patches(cells([(0, 0, 0), (1, 0, 0), (0, 1, 0)]))
+ELL = Body.from_patches(cells([(0, 0, 0), (1, 0, 0), (0, 1, 0)]))
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,7 @@ from rational_shapes import LINEAR, bent_bar, octant, quarter_ring
 
 import iga_nn
 from parameterize.certificate.boundary import check_boundary
-from parameterize.spline.multipatch import MultiPatch
+from parameterize.spline.body import Body
 from parameterize.spline.orientation import mirrored
 from solve import Elasticity, Poisson, convergence, solve_problem
 from solve.discretization.quadrature import gauss_rule, map_planes
@@ -94,7 +94,7 @@ def test_a_field_belongs_to_the_weights_too():
 
 @pytest.mark.parametrize("degree", [2, 3])
 def test_errors_on_a_ring_of_four_rational_patches_fall_with_the_order_of_the_degree(degree):
-    body = MultiPatch.from_patches([turned(quarter_ring(), k) for k in range(4)])
+    body = Body.from_patches([turned(quarter_ring(), k) for k in range(4)])
     off = [solve_problem(body, Poisson(exact=WAVE), degree=degree, refine=refine).report.l2 for refine in (2, 3)]
     assert degree + 0.8 < np.log2(off[0] / off[1]) < degree + 2.0
     area = sum(iga_nn.integrate(patch, over="u1") for patch in body)
@@ -105,7 +105,7 @@ def test_a_rational_and_a_polynomial_patch_are_glued():
     bar = iga_nn.BSplineVolume(
         (1, 1, 1), (LINEAR,) * 3, np.stack(np.meshgrid([1.0, 2.0], [-1.0, 0.0], [0.0, 1.0], indexing="ij"), axis=-1)
     )
-    body = MultiPatch.from_patches([bar, quarter_ring()])
+    body = Body.from_patches([bar, quarter_ring()])
     assert [str(interface) for interface in body.interfaces] == ["p0_v1 = p1_v0"]
     assert iga_nn.certify(body).verdict == "certified" and check_boundary(body).injective is True
     off = [solve_problem(body, Poisson(exact=WAVE), degree=3, refine=refine).report.l2 for refine in (2, 3)]

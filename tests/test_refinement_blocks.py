@@ -19,7 +19,7 @@ from parameterize.progress import History, ignore
 from parameterize.quality.two_sided import two_sided
 from parameterize.refinement import refine
 from parameterize.run import parameterize
-from parameterize.spline.multipatch import MultiPatch, shared_numbers
+from parameterize.spline.body import Body, shared_numbers
 from parameterize.surface.surface import surface_from_arrays
 
 CONFIG = SplineConfig(steps=5)
@@ -67,7 +67,7 @@ def test_knots_are_inserted_into_blocks_until_the_limit_and_the_boundary_comes_c
     found, fit, told = limited()
     assert told.stopped == "limit reached" and len(told.levels) > 1 and told.dropped is None
     assert not any(found.faults) and certify(found.spline.body).verdict == "certified"
-    assert isinstance(found.spline.body, MultiPatch)  # whose interfaces agree bit by bit
+    assert isinstance(found.spline.body, Body)  # whose interfaces agree bit by bit
     assert [level.control_points for level in told.levels] == sorted({level.control_points for level in told.levels})
     assert told.levels[0].control_points == size_of(first()[0].spline) < size_of(found.spline)
     assert told.levels[-1].control_points == size_of(found.spline)

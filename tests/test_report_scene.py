@@ -521,7 +521,7 @@ def test_the_titles_of_bars_have_the_units_that_are_given():
 def rod():
     """Three cubes along x, and u = x on them."""
     cubes = [iga_nn.BSplineVolume.from_function(lambda u, v, w, a=a: (a + u, v, w), 4) for a in range(3)]
-    body = iga_nn.MultiPatch.from_patches(cubes)
+    body = iga_nn.Body.from_patches(cubes)
     return body, solve.solve_problem(body, solve.Poisson(exact="x"))
 
 

@@ -14,7 +14,7 @@ from iga_nn.cli.commands import main
 from iga_nn.samples import write_obj
 from parameterize.config import preset
 from parameterize.run import parameterize
-from parameterize.spline.multipatch import MultiPatch
+from parameterize.spline.body import Body
 from parameterize.surface.surface import surface_from_arrays
 
 
@@ -36,7 +36,7 @@ def undisturbed(ring, options):
 
 
 def test_a_ring_becomes_certified_blocks_in_its_own_units(ring, undisturbed):
-    assert isinstance(undisturbed.volume, MultiPatch) and undisturbed.origin == "blocks"
+    assert isinstance(undisturbed.volume, Body) and undisturbed.origin == "blocks"
     assert undisturbed.certificate.verdict == "certified" and undisturbed.quality.boundary_check.injective
     assert undisturbed.certificate.volume == pytest.approx(ring.volume, rel=0.02)
     boundary = undisturbed.boundary

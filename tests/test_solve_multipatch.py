@@ -160,7 +160,7 @@ def test_modes_of_a_ring_that_is_cut():
 
 
 def test_one_patch_of_several_is_the_volume():
-    one = iga_nn.solve(iga_nn.MultiPatch((box((0, 0, 0)),)), iga_nn.Poisson(exact=WAVE))
+    one = iga_nn.solve(iga_nn.Body((box((0, 0, 0)),)), iga_nn.Poisson(exact=WAVE))
     alone = iga_nn.solve(box((0, 0, 0)), iga_nn.Poisson(exact=WAVE))
     assert np.array_equal(one.patches[0].coefficients, alone.coefficients)
     assert one.report.l2 == alone.report.l2
@@ -200,7 +200,7 @@ def test_options_that_take_one_patch_say_so():
 
 
 def test_a_part_that_nothing_holds_is_named():
-    apart = iga_nn.MultiPatch.from_patches([box((0, 0, 0)), box((2, 0, 0))])
+    apart = iga_nn.Body.from_patches([box((0, 0, 0)), box((2, 0, 0))])
     with pytest.raises(ValueError, match="nothing fixes the solution on p1, a part of its own"):
         iga_nn.solve(apart, iga_nn.Poisson(source="0", value={"p0_u0": "1"}))
     with pytest.raises(ValueError, match="p1: no support holds the body"):
@@ -235,7 +235,7 @@ def test_a_space_without_unknowns_is_refused():
 
 def test_a_body_of_two_free_parts_has_twelve_rigid_motions():
     free = {f"{axis}{side}": ("0", "0", "0") for axis in "uvw" for side in (0, 1)}
-    apart = iga_nn.MultiPatch.from_patches([box((0, 0, 0), 1, 2), box((2, 0, 0), 1, 2)])
+    apart = iga_nn.Body.from_patches([box((0, 0, 0), 1, 2), box((2, 0, 0), 1, 2)])
     found = iga_nn.modes(apart, iga_nn.Elasticity(traction=free), n=2)
     assert found.rigid == 12 and found.frequencies[0] > 0.01
 
@@ -250,7 +250,7 @@ def test_a_face_that_holds_a_patch_by_rounding_alone_leaves_it_free():
         return iga_nn.BSplineVolume.from_function(place, 7, 3)
 
     law = iga_nn.Elasticity(roller="ny < -0.999", fix="nz < -0.999", load={"nx > 0.99": (0, 0, 1)})
-    report = iga_nn.solve(iga_nn.MultiPatch.from_patches([part(0.0, 8.0), part(8.0, 50.0)]), law, refine=0).report
+    report = iga_nn.solve(iga_nn.Body.from_patches([part(0.0, 8.0), part(8.0, 50.0)]), law, refine=0).report
     assert report.converged and report.iterations < 150
 
 

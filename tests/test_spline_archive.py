@@ -7,7 +7,7 @@ from glued import demand_same
 
 import iga_nn
 from parameterize.files import load_arrays, save_arrays
-from parameterize.spline.multipatch import MultiPatch
+from parameterize.spline.body import Body
 from solve import benchmark_volume
 
 TURNS = [((0, 1, 2), (False, False, False)), ((1, 2, 0), (True, False, True)), ((2, 1, 0), (False, True, False))]
@@ -30,10 +30,10 @@ def test_a_body_is_read_again_bit_by_bit(body, tmp_path):
 def test_one_patch_is_written_as_a_volume(tmp_path):
     volume = benchmark_volume(2)
     volume.save(tmp_path / "volume.npz")
-    MultiPatch((volume,)).save(tmp_path / "body.npz")
+    Body((volume,)).save(tmp_path / "body.npz")
     assert (tmp_path / "body.npz").read_bytes() == (tmp_path / "volume.npz").read_bytes()
     assert isinstance(iga_nn.load_volume(tmp_path / "body.npz"), iga_nn.BSplineVolume)
-    assert len(MultiPatch.load(tmp_path / "volume.npz")) == 1
+    assert len(Body.load(tmp_path / "volume.npz")) == 1
 
 
 @pytest.mark.parametrize(

@@ -10,10 +10,10 @@ from bodies import turned
 from cube_grids import box, frame, plate, ring, two
 
 import iga_nn
-from iga_nn import BSplineVolume, Interface, MultiPatch
+from iga_nn import Body, BSplineVolume, Interface
+from parameterize.spline.body import shared_numbers
 from parameterize.spline.bspline import greville
 from parameterize.spline.interface import face_layer
-from parameterize.spline.multipatch import shared_numbers
 
 
 def uneven(corner):
@@ -32,7 +32,7 @@ def uneven(corner):
 @pytest.mark.parametrize("flips", list(product((False, True), repeat=3)))
 def test_a_neighbour_is_found_however_its_parameters_run(axes, flips):
     first, second = uneven((0, 0, 0)), turned(uneven((0, 1, 0)), axes, flips)
-    body = MultiPatch.from_patches([first, second])
+    body = Body.from_patches([first, second])
     (interface,) = body.interfaces
     assert interface.first == (0, "v1")
     nets = [face_layer(body.patches[p].control_points, face) for p, face in (interface.first, interface.second)]
@@ -66,14 +66,14 @@ def test_shared_coefficients_have_one_number():
 def test_nearly_equal_control_points_become_one():
     left, right = box((0, 0, 0)), box((1, 0, 0))
     moved = BSplineVolume(right.degrees, right.knots, right.control_points + 1e-9)
-    body = MultiPatch.from_patches([left, moved])
+    body = Body.from_patches([left, moved])
     assert np.array_equal(body.patches[0].control_points[-1], body.patches[1].control_points[0])
-    assert MultiPatch.from_patches([left, moved], tolerance=1e-12).interfaces == ()
+    assert Body.from_patches([left, moved], tolerance=1e-12).interfaces == ()
 
 
 def test_faces_over_the_same_corners_with_other_shapes_are_not_glued():
     lens = BSplineVolume.from_function(lambda u, v, w: (u + 0.2 * (1 - u) * v * (1 - v), v, w), 5)
-    assert MultiPatch.from_patches([box((-1, 0, 0)), lens]).interfaces == ()
+    assert Body.from_patches([box((-1, 0, 0)), lens]).interfaces == ()
 
 
 def test_a_face_that_has_shrunk_to_an_edge_is_not_glued():
@@ -82,7 +82,7 @@ def test_a_face_that_has_shrunk_to_an_edge_is_not_glued():
         BSplineVolume.from_function(lambda u, v, w, s=s: (s * u, u * (2 * v - 1) / 2, w), 3, degree=1)
         for s in (1.0, -1.0)
     ]
-    assert MultiPatch.from_patches(wedges).interfaces == ()
+    assert Body.from_patches(wedges).interfaces == ()
 
 
 @pytest.mark.parametrize(
@@ -96,7 +96,7 @@ def test_a_face_that_has_shrunk_to_an_edge_is_not_glued():
 )
 def test_what_does_not_match_is_named(patches, says):
     with pytest.raises(ValueError, match=says):
-        MultiPatch.from_patches(patches())
+        Body.from_patches(patches())
 
 
 @pytest.mark.parametrize(
@@ -110,24 +110,24 @@ def test_what_does_not_match_is_named(patches, says):
 )
 def test_interfaces_without_equal_traces_are_refused(interfaces, says):
     with pytest.raises(ValueError, match=says):
-        MultiPatch((box((0, 0, 0)), box((1, 0, 0))), tuple(interfaces))
+        Body((box((0, 0, 0)), box((1, 0, 0))), tuple(interfaces))
 
 
 def test_other_objects_are_refused():
     with pytest.raises(TypeError, match="must be a BSplineVolume"):
-        iga_nn.MultiPatch.from_patches([box((0, 0, 0)), "volume.npz"])
+        iga_nn.Body.from_patches([box((0, 0, 0)), "volume.npz"])
     with pytest.raises(TypeError, match="patches must be a list of volumes, got BSplineVolume"):
-        iga_nn.MultiPatch.from_patches(box((0, 0, 0)))
+        iga_nn.Body.from_patches(box((0, 0, 0)))
 
 
 @pytest.mark.parametrize("tolerance", [-1.0, np.nan, 1.0, "a", None])
 def test_a_tolerance_is_a_share(tolerance):
     with pytest.raises(ValueError, match="tolerance must be a share of the body's size"):
-        MultiPatch.from_patches([box((0, 0, 0))], tolerance=tolerance)
+        Body.from_patches([box((0, 0, 0))], tolerance=tolerance)
 
 
 def test_faces_that_nearly_match_are_told_but_not_glued():
-    body = MultiPatch.from_patches([box((0, 0, 0)), box((1.00001, 0, 0)), box((2.00001, 0, 0)), box((4, 0, 0))])
+    body = Body.from_patches([box((0, 0, 0)), box((1.00001, 0, 0)), box((2.00001, 0, 0)), box((4, 0, 0))])
     ((pair, distance),) = body.nearly_glued
     assert str(pair) == "p0_u1 = p1_u0" and distance == pytest.approx(1e-5)
     assert body.parts == [[0], [1, 2], [3]]
@@ -147,7 +147,7 @@ def test_two_directions_are_flipped_or_not():
 
 def test_interfaces_are_objects():
     with pytest.raises(TypeError, match="interfaces must be Interface objects, got 'p0_u1 = p1_u0'"):
-        MultiPatch((box((0, 0, 0)), box((1, 0, 0))), ("p0_u1 = p1_u0",))
+        Body((box((0, 0, 0)), box((1, 0, 0))), ("p0_u1 = p1_u0",))
 
 
 def test_points_are_located_in_their_patches():

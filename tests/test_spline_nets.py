@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from block_bodies import BODIES, rod, uniform_nets, wavy
 
+from parameterize.spline.body import Body
 from parameterize.spline.interface import Interface, axis_side, face_layer
-from parameterize.spline.multipatch import MultiPatch
 
 TURNS = (0, 5, 7)
 
@@ -90,9 +90,9 @@ def test_exposed_faces_are_those_that_are_not_glued(nets):
 def test_one_cube_merges_nothing_and_one_glued_to_itself_is_no_cube():
     nets = uniform_nets((2, 2, 2))
     control = random_control(nets)
-    assert nets.one_cube and nets.merged(control) is control and nets.exposed.all()
+    assert nets.is_single and nets.merged(control) is control and nets.exposed.all()
     tube = uniform_nets((2, 2, 2), interfaces=[Interface((0, "w0"), (0, "w1"))])
-    assert not tube.one_cube and tube.exposed.tolist() == [True] * 4 + [False] * 2
+    assert not tube.is_single and tube.exposed.tolist() == [True] * 4 + [False] * 2
     ends = tube.of_block(tube.merged(control), 0)[..., [0, -1]]
     assert np.array_equal(ends[..., 0], ends[..., 1])
     assert ends[..., 0] == pytest.approx(tube.of_block(control, 0)[..., [0, -1]].mean(axis=-1))
@@ -100,4 +100,4 @@ def test_one_cube_merges_nothing_and_one_glued_to_itself_is_no_cube():
 
 def test_a_merged_map_is_a_body_of_patches():
     body = wavy(rod(7, lengths=(1.0, 2.0, 0.5)), 0.05).body  # interfaces are checked, bit by bit
-    assert isinstance(body, MultiPatch) and len(body) == 3 and len(body.interfaces) == 2
+    assert isinstance(body, Body) and len(body) == 3 and len(body.interfaces) == 2

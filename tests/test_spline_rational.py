@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from rational_shapes import bent_bar, octant, quarter_ring
 
-from parameterize.spline.multipatch import MultiPatch
+from parameterize.spline.body import Body
 from parameterize.spline.orientation import mirrored
 from parameterize.spline.volume import BSplineVolume
 
@@ -77,7 +77,7 @@ def test_parts_of_a_ring_lie_on_its_circles_and_are_glued():
         places = points_inside()
         whole = np.stack([places[:, 0], low + (high - low) * places[:, 1], places[:, 2]], axis=1)
         np.testing.assert_allclose(part(places), quarter_ring()(whole), atol=1e-14)
-    assert len(MultiPatch.from_patches(parts).interfaces) == 2
+    assert len(Body.from_patches(parts).interfaces) == 2
 
 
 def test_moved_and_mirrored():
@@ -134,9 +134,9 @@ def test_other_weights_are_refused(tmp_path, weights, message):
 
 def test_faces_are_glued_where_their_weights_agree_up_to_a_factor():
     inner, outer = quarter_ring(1.0, 2.0), quarter_ring(2.0, 3.0)
-    body = MultiPatch.from_patches([inner, replace(outer, weights=3.0 * outer.weights)])
+    body = Body.from_patches([inner, replace(outer, weights=3.0 * outer.weights)])
     assert [str(interface) for interface in body.interfaces] == ["p0_u1 = p1_u0"]
     np.testing.assert_array_equal(body.patches[1].weights, 3.0 * outer.weights)
-    assert not MultiPatch.from_patches([inner, replace(outer, weights=outer.weights**2)]).interfaces  # no circle
+    assert not Body.from_patches([inner, replace(outer, weights=outer.weights**2)]).interfaces  # no circle
     with pytest.raises(ValueError, match="the control points or weights of the two faces differ"):
-        MultiPatch((inner, replace(outer, weights=None)), body.interfaces)
+        Body((inner, replace(outer, weights=None)), body.interfaces)

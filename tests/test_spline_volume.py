@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from parameterize.spline.body import Body
 from parameterize.spline.bspline import greville, open_uniform_knots
-from parameterize.spline.multipatch import MultiPatch
 from parameterize.spline.volume import BSplineVolume
 
 CUBE = np.array([[i, j, k] for i in (0.0, 1.0) for j in (0.0, 1.0) for k in (0.0, 1.0)])
@@ -246,7 +246,7 @@ def test_a_divided_volume_is_the_same_map_in_parts():
     for number, part in enumerate(parts):
         low, high = (np.array([ends[number // 2][i], i, [(0, 1 / 3), (1 / 3, 1)][number % 2][i]]) for i in (0, 1))
         assert part(where) == pytest.approx(volume(low + where * (high - low)), abs=1e-14)
-    assert len(MultiPatch.from_patches(parts).interfaces) == 7
+    assert len(Body.from_patches(parts).interfaces) == 7
 
 
 @pytest.mark.parametrize("cuts", [[0.0], [1.0], [0.5, 0.5], [np.nan], [-1.0]])

@@ -10,7 +10,7 @@ import iga_nn
 from parameterize.attempts import COLUMNS, PLANES, STARTS, starts_of
 from parameterize.config import RefinementConfig, preset
 from parameterize.run import parameterize
-from parameterize.spline.multipatch import MultiPatch
+from parameterize.spline.body import Body
 from parameterize.starts.sharp import SHARP
 from parameterize.starts.start import Task
 from parameterize.surface.surface import surface_from_arrays
@@ -34,7 +34,7 @@ def test_the_map_of_a_body_that_planes_bound_is_exact_and_certified(name, few_di
     assert (result.origin, [one.ending for one in result.attempts]) == ("planes", ["exact"])
     assert result.certificate.verdict == "certified" and result.quality.boundary_check.injective is True
     assert result.quality.relative_distance.max < 1e-12 and result.quality.boundary.as_given.max < 1e-12
-    assert isinstance(result.volume, MultiPatch) == (count > 1)
+    assert isinstance(result.volume, Body) == (count > 1)
     if count == 1:
         assert result.volume.shape == (6, 6, 6)
         assert np.array_equal(np.sort(result.boundary.cube_faces), np.repeat(np.arange(6), 2))

@@ -11,7 +11,7 @@ from patches import SYMMETRIES, patch, turned
 from iga_nn.cli.commands import main
 from iga_nn.figures import render as rendering
 from parameterize.cube.boundary_map import BoundaryMap
-from parameterize.spline.multipatch import MultiPatch
+from parameterize.spline.body import Body
 from solve.field import MultiPatchField
 
 
@@ -25,7 +25,7 @@ def bent_ell():
 
         return turned(patch(place, 4), symmetry)
 
-    return MultiPatch.from_patches([cube(0, 0, SYMMETRIES[0]), cube(1, 0, SYMMETRIES[21]), cube(0, 1, SYMMETRIES[38])])
+    return Body.from_patches([cube(0, 0, SYMMETRIES[0]), cube(1, 0, SYMMETRIES[21]), cube(0, 1, SYMMETRIES[38])])
 
 
 def write_surface(path, body):
@@ -69,7 +69,7 @@ def test_a_run_on_blocks_solves_and_tells_what_they_distort(on_blocks, in_folder
     assert facts["arap"]["as_given"]["mean"] == pytest.approx(mean)
     assert facts["surface_distance"]["two_sided"]["of_diagonal"]["rms"] < 2e-3
     assert levels[1]["l2_relative"] < levels[0]["l2_relative"] < 1e-3
-    assert len(MultiPatch.load(in_folder / "out" / "volume.npz")) == 3
+    assert len(Body.load(in_folder / "out" / "volume.npz")) == 3
     assert len(MultiPatchField.load(in_folder / "out" / "solution.npz").patches) == 3
     boundary = BoundaryMap.load(in_folder / "out" / "boundary.npz")
     assert on_blocks.points(boundary.patches, boundary.parameters) == pytest.approx(boundary.vertices, abs=1e-12)

@@ -17,13 +17,13 @@ def ell():
     """An L of three cubes."""
     places = [(0, 0), (1, 0), (0, 1)]
     cubes = [mapped(lambda u, v, w, a=a, b=b: (a + u, b + v, w), (4, 4, 4), (2, 2, 2)) for a, b in places]
-    return iga_nn.MultiPatch.from_patches(cubes)
+    return iga_nn.Body.from_patches(cubes)
 
 
 def rod():
     """Two cubes along x."""
     cubes = [mapped(lambda u, v, w, a=a: (a + u, v, w), (3, 3, 3), (2, 2, 2)) for a in (0, 1)]
-    return iga_nn.MultiPatch.from_patches(cubes)
+    return iga_nn.Body.from_patches(cubes)
 
 
 def report_of(folder):
@@ -45,7 +45,7 @@ def test_check_says_what_is_proved_of_a_body_and_its_patches(in_folder, capsys):
 
 def test_a_patch_that_is_folded_back_is_not_certified(in_folder, capsys):
     back = mapped(lambda u, v, w: (1 - u / 2, v, w), (3, 3, 3), (2, 2, 2))
-    iga_nn.MultiPatch.from_patches([rod().patches[0], back]).save("back.npz")
+    iga_nn.Body.from_patches([rod().patches[0], back]).save("back.npz")
     assert main(["solve", "poisson", "back.npz", "--refine", "0", "--out", "back"]) == 3
     said = capsys.readouterr().out
     assert "folded back      at p0_u1 = p1_u0" in said and "one sign of det J folded; one-to-one: no" in said
@@ -55,7 +55,7 @@ def test_a_patch_that_is_folded_back_is_not_certified(in_folder, capsys):
 
 def test_a_body_with_a_part_inside_another_overlaps(in_folder, capsys):
     inside = mapped(lambda u, v, w: (0.3 + 0.1 * u, 0.3 + 0.1 * v, 0.3 + 0.1 * w), (3, 3, 3), (2, 2, 2))
-    iga_nn.MultiPatch.from_patches([*rod().patches, inside]).save("both.npz")
+    iga_nn.Body.from_patches([*rod().patches, inside]).save("both.npz")
     assert main(["solve", "poisson", "both.npz", "--refine", "0", "--out", "both"]) == 3
     said = capsys.readouterr().out
     assert "overlaps         parts of the body" in said and "det J > 0 certified; one-to-one: no" in said

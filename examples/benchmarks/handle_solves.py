@@ -21,11 +21,11 @@ from processes import OneLineParser, as_markdown
 import iga_nn
 from iga_nn.level_table import csv_text
 from parameterize.files import save_text
-from parameterize.spline.multipatch import as_multipatch
+from parameterize.spline.body import as_body
 from parameterize.spline.sampled_boundary import SampledBoundary
 from solve import benchmark_volume
 
-Body = iga_nn.BSplineVolume | iga_nn.MultiPatch
+BodyLike = iga_nn.BSplineVolume | iga_nn.Body
 EXACT = "exp(X+Z)*sin(Y)"  # of Poisson's equation, and of each component of a displacement
 KNOWN = {"poisson": iga_nn.Poisson(exact=EXACT), "elasticity": iga_nn.Elasticity(exact=(EXACT,) * 3)}
 CLAMPED = "clamped"
@@ -99,9 +99,9 @@ def kept(folder: Path) -> Iterator[Row]:
         yield Row(body=line["body"], law=line["law"], **counts, **figures)
 
 
-def rows_of(name: str, body: Body, laws: Sequence[str] = LAWS) -> Iterator[Row]:
+def rows_of(name: str, body: BodyLike, laws: Sequence[str] = LAWS) -> Iterator[Row]:
     """Yield the solves on one body, law after law, level after level."""
-    blocks = len(as_multipatch(body).patches)
+    blocks = len(as_body(body).patches)
     for law in laws:
         before = None
         for level in range(LEVELS):
@@ -117,7 +117,7 @@ def rows_of(name: str, body: Body, laws: Sequence[str] = LAWS) -> Iterator[Row]:
             before = figure
 
 
-def solved(law: str, body: Body, level: int) -> tuple[int, float, int]:
+def solved(law: str, body: BodyLike, level: int) -> tuple[int, float, int]:
     """Return the unknowns, the relative L2 error or the work of the pull, and the iterations of a solve."""
     pulled, problem = ("", KNOWN[law]) if law in KNOWN else clamped_and_pulled(body)
     solution = iga_nn.solve(body, problem, refine=level, tolerance=TOLERANCE, estimate=False)
@@ -125,7 +125,7 @@ def solved(law: str, body: Body, level: int) -> tuple[int, float, int]:
     return report.dofs, work_of(solution, pulled) if pulled else report.l2_relative, report.iterations
 
 
-def clamped_and_pulled(body: Body) -> tuple[str, iga_nn.Elasticity]:
+def clamped_and_pulled(body: BodyLike) -> tuple[str, iga_nn.Elasticity]:
     """Return the region on which a body is pulled outward, and the problem: it is clamped on the opposite side."""
     points = SampledBoundary.of(body).points
     low, high = points.min(axis=0), points.max(axis=0)

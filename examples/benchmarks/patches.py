@@ -28,27 +28,27 @@ PLATE = [(i, j, 0) for i, j, k in GRID if k == 0 and (i, j) != (1, 1)]
 FRAME = [cell for cell in GRID if cell.count(1) < 2]
 
 
-def cubes(cells: list[tuple[int, ...]], spans: int) -> iga_nn.MultiPatch:
+def cubes(cells: list[tuple[int, ...]], spans: int) -> iga_nn.Body:
     """Return unit cubes at whole places, glued where they touch."""
 
     def cube(cell: tuple[int, ...]) -> iga_nn.BSplineVolume:
         x, y, z = cell
         return iga_nn.BSplineVolume.from_function(lambda u, v, w: (x + u, y + v, z + w), spans + 3)
 
-    return iga_nn.MultiPatch.from_patches([cube(cell) for cell in cells])
+    return iga_nn.Body.from_patches([cube(cell) for cell in cells])
 
 
-def ring(spans: int) -> iga_nn.MultiPatch:
+def ring(spans: int) -> iga_nn.Body:
     """Return a ring of radii 1 and 2 of one patch."""
 
     def place(u: np.ndarray, v: np.ndarray, w: np.ndarray) -> tuple[np.ndarray, ...]:
         return (1.0 + v) * np.cos(2.0 * np.pi * u), (1.0 + v) * np.sin(2.0 * np.pi * u), w
 
     counts = (2 * spans + 3, spans // 2 + 3, spans // 2 + 3)
-    return iga_nn.MultiPatch.from_patches([iga_nn.BSplineVolume.from_function(place, counts)])
+    return iga_nn.Body.from_patches([iga_nn.BSplineVolume.from_function(place, counts)])
 
 
-def measured(body: iga_nn.MultiPatch | iga_nn.BSplineVolume, law: iga_nn.Poisson) -> tuple[int, int, float]:
+def measured(body: iga_nn.Body | iga_nn.BSplineVolume, law: iga_nn.Poisson) -> tuple[int, int, float]:
     """Return unknowns, iterations, and CPU nanoseconds of an unknown for a product and a preconditioner, one thread."""
     system = iga_nn.discretize(body, law, threads=1)
     right = np.random.default_rng(0).uniform(-1.0, 1.0, system.right.shape)
@@ -61,7 +61,7 @@ def measured(body: iga_nn.MultiPatch | iga_nn.BSplineVolume, law: iga_nn.Poisson
     return right.size, found.iterations, 1e9 * min(seconds) / right.size
 
 
-def held_at(body: iga_nn.MultiPatch, face: str) -> dict[str, None]:
+def held_at(body: iga_nn.Body, face: str) -> dict[str, None]:
     """Return the exact flux as data of all outer faces but one."""
     names = [f"p{i}_{name}" for i, faces in enumerate(body.outer) for name in faces]
     return {name: None for name in names if name != face}

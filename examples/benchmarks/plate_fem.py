@@ -76,7 +76,7 @@ def at_wall(x: np.ndarray, side: float) -> np.ndarray:
 # Splines
 
 
-def of_splines(body: iga_nn.MultiPatch, refine: int) -> tuple[int, Figures]:
+def of_splines(body: iga_nn.Body, refine: int) -> tuple[int, Figures]:
     """Return the unknowns and the figures of a solve on blocks."""
     law = iga_nn.Elasticity(**LAW, fix=HELD, load={PULLED: (1.0, 0.0, 0.0)})
     solution = iga_nn.solve(body, law, refine=refine, tolerance=1e-8, estimate=False)

@@ -7,7 +7,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from parameterize.arrays import Array
-from parameterize.spline.multipatch import MultiPatch
+from parameterize.spline.body import Body
 from parameterize.spline.volume import FACE_NAMES
 
 from .cutaway import INSIDE
@@ -22,7 +22,7 @@ APART = 0.35  # of a block's distance from the middle of all, by which it is mov
 INTERFACE = "#ee6677"
 
 
-def draw_blocks(path: str | Path | None, body: MultiPatch) -> Figure:
+def draw_blocks(path: str | Path | None, body: Body) -> Figure:
     """Draw the blocks apart, each in its colour and with light glued faces, and the interfaces in the glass body."""
     points, outer = points_of(body).patches, outer_faces(body)
     every = [PER_PATCH * number + face for number in range(len(body)) for face in range(len(FACE_NAMES))]

@@ -10,12 +10,12 @@ from itertools import product
 import numpy as np
 
 from parameterize.arrays import Array, Mask
+from parameterize.spline.body import Body, BodyLike, as_body
 from parameterize.spline.interface import face_layer
-from parameterize.spline.multipatch import MultiPatch, as_multipatch
 from parameterize.spline.orientation import orientation
 from parameterize.spline.volume import AXES, FACE_NAMES
 
-from .evaluate import PER_PATCH, Body
+from .evaluate import PER_PATCH
 from .fields import Samples
 from .palette import face_colors
 from .render import Patch, View, plain_patch, view_of
@@ -25,7 +25,7 @@ Octant = tuple[int, int, int]  # its corner of the cube: the sides, 0 or 1, of u
 INSIDE = "#e9e6df"  # colour of the sections, unlike the six colours of the faces
 
 
-def patches_of(body: Body, points: Sequence[Array], every: int = 0) -> list[Patch]:
+def patches_of(body: BodyLike, points: Sequence[Array], every: int = 0) -> list[Patch]:
     """Return the images of each patch's six faces, in their colours, and of u, v and w = 1/2, in one colour.
 
     points: on each (m, n, 3). every: as in Patch.
@@ -35,13 +35,13 @@ def patches_of(body: Body, points: Sequence[Array], every: int = 0) -> list[Patc
     return [plain_patch(where, color, every=every) for where, color in zip(points, named, strict=True)]
 
 
-def cut_of(body: Body, faces: Sequence[Patch], points: Samples) -> tuple[Mask, View]:
+def cut_of(body: BodyLike, faces: Sequence[Patch], points: Samples) -> tuple[Mask, View]:
     """Return the octants (patches, 2, 2, 2) that are left out, and the view that shows most of the cut.
 
     faces: the patches of the outer faces. points: of the body at rest. Of several patches the octants are left out that
     lie in the upper half and towards the viewer.
     """
-    if not isinstance(body, MultiPatch):
+    if not isinstance(body, Body):
         octant, view = best_cut(faces, orientation(body))
         return only(octant), view
     view = view_of(faces)
@@ -79,7 +79,7 @@ def best_cut(faces: Sequence[Patch], hand: int = 1) -> tuple[Octant, View]:
     return max(choices, key=lambda choice: hand * float(_outside(points, choice[0]) @ choice[1].towards))
 
 
-def visible(body: Body, patches: Sequence[Patch], left_out: Mask) -> list[Patch]:
+def visible(body: BodyLike, patches: Sequence[Patch], left_out: Mask) -> list[Patch]:
     """Return what is seen of a body, of whose patches nine each are given, without some octants (patches, 2, 2, 2).
 
     Whole faces come first of each patch; faces and sections of which a part is seen are given in quarters.
@@ -93,21 +93,21 @@ def visible(body: Body, patches: Sequence[Patch], left_out: Mask) -> list[Patch]
     return shown
 
 
-def seen_quarters(body: Body, left_out: Mask) -> Iterator[Mask]:
+def seen_quarters(body: BodyLike, left_out: Mask) -> Iterator[Mask]:
     """Yield for each patch which quarters (9, 2, 2) of its six faces and three mid-sections are seen.
 
     left_out: octants (patches, 2, 2, 2). A quarter of a face is seen where its octant is there and nothing lies behind
     it: the outside, or an octant of the patch it is glued to that is left out. A quarter of a section is seen between
     two octants of which one is left out.
     """
-    behind = _behind(as_multipatch(body), left_out)
+    behind = _behind(as_body(body), left_out)
     for number, own in enumerate(left_out):
         faces = [~face_layer(own, name) & behind.get((number, name), np.bool_(True)) for name in FACE_NAMES]
         sections = [np.take(own, 0, axis) != np.take(own, 1, axis) for axis in range(3)]
         yield np.stack([*faces, *sections])
 
 
-def _behind(body: MultiPatch, left_out: Mask) -> dict[tuple[int, str], Mask]:
+def _behind(body: Body, left_out: Mask) -> dict[tuple[int, str], Mask]:
     """Return for each glued face whether the octants (2, 2) behind it are left out."""
     found = {}
     for interface in body.interfaces:

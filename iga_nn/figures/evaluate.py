@@ -11,13 +11,12 @@ from numpy.typing import ArrayLike
 
 from parameterize.arrays import Array
 from parameterize.quality.distortion import arap_in_box, arap_on, own_box
-from parameterize.spline.multipatch import MultiPatch, as_multipatch
+from parameterize.spline.body import Body, BodyLike, as_body
 from parameterize.spline.volume import AXES, FACE_NAMES, BSplineVolume
 from solve.field import MultiPatchField, Points, SplineField
 from solve.forms.boundary_value_problem import BoundaryValueProblem
 from solve.forms.frame import UnitFrame
 
-Body = BSplineVolume | MultiPatch
 Solved = SplineField | MultiPatchField  # a solution on a body
 Grid = tuple[Array, Array, Array]  # parameters of a tensor grid; one direction has a single value
 
@@ -51,9 +50,9 @@ def points_on(volume: BSplineVolume, grid: Grid) -> Array:
     return flat(volume.grid(*grid))
 
 
-def outer_faces(body: Body) -> list[int]:
+def outer_faces(body: BodyLike) -> list[int]:
     """Return the places of the faces that are not glued among the nine faces and sections of each patch."""
-    each = enumerate(as_multipatch(body).outer)
+    each = enumerate(as_body(body).outer)
     return [PER_PATCH * i + FACE_NAMES.index(name) for i, names in each for name in names]
 
 
@@ -62,12 +61,12 @@ def fields_on(solution: Solved) -> tuple[SplineField, ...]:
     return solution.patches if isinstance(solution, MultiPatchField) else (solution,)
 
 
-def arap_of(body: Body) -> list[Callable[[Grid], Array]]:
+def arap_of(body: BodyLike) -> list[Callable[[Grid], Array]]:
     """Return for each patch the function that gives the ARAP distortion (n_u, n_v, n_w) on a tensor grid.
 
     A volume is measured at volume 1, each of several patches against its own box.
     """
-    if isinstance(body, MultiPatch):
+    if isinstance(body, Body):
         return [_in_box(patch) for patch in body]
     volume, scale = body, 1.0 / UnitFrame.of(body).length
     return [lambda grid: arap_on(volume, *grid, scale)]
@@ -78,10 +77,10 @@ def _in_box(patch: BSplineVolume) -> Callable[[Grid], Array]:
     return lambda grid: arap_in_box(patch, *grid, box)
 
 
-def problems_on(problem: BoundaryValueProblem, body: Body) -> list[BoundaryValueProblem]:
+def problems_on(problem: BoundaryValueProblem, body: BodyLike) -> list[BoundaryValueProblem]:
     """Return the problem on each patch, with X, Y, Z measured in the body."""
     placed = problem.on(body)
-    if not isinstance(body, MultiPatch):
+    if not isinstance(body, Body):
         return [placed]
     return [placed.on_patch(i, faces) for i, faces in enumerate(body.outer)]
 

@@ -12,13 +12,13 @@ from typing import Any, TypeVar
 import numpy as np
 
 from parameterize.arrays import Array
-from parameterize.spline.multipatch import MultiPatch, as_multipatch
+from parameterize.spline.body import Body, BodyLike, as_body
 from solve.field import Points, SplineField
 from solve.forms.boundary_value_problem import BoundaryValueProblem
 from solve.forms.form import Quantity
 from solve.quantities import grid_values
 
-from .evaluate import Body, Grid, Solved, all_grids, arap_of, error_at, fields_on, flat, problems_on
+from .evaluate import Grid, Solved, all_grids, arap_of, error_at, fields_on, flat, problems_on
 from .ranges import ColorRange, error_range, even_range
 
 SAMPLES = 121  # per direction of a face or mid-section
@@ -87,9 +87,9 @@ def remembered(function: Callable[..., Result]) -> Callable[..., Result]:
 
 
 @remembered
-def points_of(body: Body) -> Samples:
+def points_of(body: BodyLike) -> Samples:
     """Return the points (..., 3) of a body."""
-    return sampled([_on_grid(patch) for patch in as_multipatch(body)])
+    return sampled([_on_grid(patch) for patch in as_body(body)])
 
 
 def _on_grid(spline: Any) -> Callable[[Grid], Array]:
@@ -104,14 +104,14 @@ def diagonal_of(points: Samples) -> float:
 
 
 @remembered
-def distortion_of(body: Body) -> Field:
+def distortion_of(body: BodyLike) -> Field:
     """Return tanh(sqrt(ARAP) / 2), as the paper colours it, at volume 1; of several patches, each in its own box."""
 
     def colored(arap_at: Callable[[Grid], Array]) -> Callable[[Grid], Array]:
         return lambda grid: np.tanh(np.sqrt(arap_at(grid)) / 2.0)
 
     found = sampled([colored(arap_at) for arap_at in arap_of(body)])
-    title = f"tanh(√ARAP / 2), {'each in its own box' if isinstance(body, MultiPatch) else 'at volume 1'}"
+    title = f"tanh(√ARAP / 2), {'each in its own box' if isinstance(body, Body) else 'at volume 1'}"
     return Field(found.patches, found.lattices, "distortion", title, ColorRange(0.0, 1.0))
 
 
@@ -185,9 +185,9 @@ def fields_of(solution: Solved) -> list[Field]:
 
 
 @remembered
-def error_of(body: Body, solution: Solved, problem: BoundaryValueProblem) -> Field:
+def error_of(body: BodyLike, solution: Solved, problem: BoundaryValueProblem) -> Field:
     """Return |u - u_h|, whose range is logarithmic. problem: its exact solution is known."""
-    parts = zip(as_multipatch(body), fields_on(solution), problems_on(problem, body), strict=True)
+    parts = zip(as_body(body), fields_on(solution), problems_on(problem, body), strict=True)
 
     def found_on(patch: Any, field: SplineField, own: BoundaryValueProblem) -> Callable[[Grid], Array]:
         return lambda grid: error_at(field.grid(*grid), own, Points.on(patch, *grid))

@@ -6,10 +6,10 @@ from typing import Any
 import numpy as np
 
 from parameterize.arrays import Array
-from parameterize.spline.multipatch import MultiPatch
+from parameterize.spline.body import Body, BodyLike
 
 from .cutaway import beyond, visible
-from .evaluate import SECTIONS, Body
+from .evaluate import SECTIONS
 from .fields import Samples
 from .render import Patch, View, draw
 from .style import PANEL, show_section
@@ -17,13 +17,13 @@ from .style import PANEL, show_section
 UP, ASIDE = 0.4, 0.25  # of a viewer in front of a cut: shows more than one side of what is left
 
 
-def show_inside(panels: Any, body: Body, points: Samples, patches: Sequence[Patch]) -> None:
+def show_inside(panels: Any, body: BodyLike, points: Samples, patches: Sequence[Patch]) -> None:
     """Draw the nine patches of each patch of a body on three panels. points: of the body at rest.
 
     Of a volume these are its mid-sections. Several patches are drawn without the octants on the far side of x, of y and
     of z, as one sees them from there.
     """
-    if not isinstance(body, MultiPatch):
+    if not isinstance(body, Body):
         for panel, title, patch in zip(panels, SECTIONS, patches[6:], strict=True):
             show_section(panel, title, patch.points, patch.colors)
         return

@@ -9,12 +9,12 @@ from matplotlib.figure import Figure
 
 from parameterize.arrays import Array
 from parameterize.certificate.boundary import Meeting
+from parameterize.spline.body import Body, BodyLike, as_body
 from parameterize.spline.interface import face_label
-from parameterize.spline.multipatch import MultiPatch, as_multipatch
 from parameterize.spline.volume import FACE_NAMES
 
 from .cutaway import cut_of, octant_label, patches_of, visible
-from .evaluate import PER_PATCH, Body, face_window, outer_faces, points_on
+from .evaluate import PER_PATCH, face_window, outer_faces, points_on
 from .fields import SAMPLES, distortion_of, points_of
 from .inside import show_inside
 from .render import NAMELESS, Patch, check_drawable, draw, plain_patch, view_of
@@ -25,32 +25,32 @@ WINDOW = 0.15  # of the cube, on every side of a meeting place
 MEETING_COLORS = ("#4477aa", "#ee6677")
 
 
-def draw_faces(path: str | Path | None, body: Body, marks: Array | None = None) -> Figure:
+def draw_faces(path: str | Path | None, body: BodyLike, marks: Array | None = None) -> Figure:
     """Draw the images of the six faces of the cube, each in its colour, from the front and from behind.
 
     Of several patches the outer faces are drawn, in the colour of their patch and with their names. marks: points (k,
     3) shown as black balls, such as given corners (the paper's Fig. 13).
     """
-    if not isinstance(body, MultiPatch):
+    if not isinstance(body, Body):
         return _draw_around(path, body, 0, "Images of the six faces of the unit cube", marks)
     return _draw_around(path, body, 0, "The patches and their outer faces", marks, _names_of(body))
 
 
-def _names_of(body: MultiPatch) -> dict[str, Array]:
+def _names_of(body: Body) -> dict[str, Array]:
     """Return the names of the outer faces of patches, each with the point in the middle of the face."""
     patches = points_of(body).patches
     named = {face_label(k // PER_PATCH, FACE_NAMES[k % PER_PATCH]): patches[k] for k in outer_faces(body)}
     return {name: points[len(points) // 2, len(points) // 2] for name, points in named.items()}
 
 
-def draw_lines(path: str | Path | None, body: Body) -> Figure:
+def draw_lines(path: str | Path | None, body: BodyLike) -> Figure:
     """Draw lines of constant parameters, a tenth apart, on the outer faces, from the front and from behind."""
     return _draw_around(path, body, LINES, "Lines of constant u, v, w, a tenth apart")
 
 
 def _draw_around(
     path: str | Path | None,
-    body: Body,
+    body: BodyLike,
     lines: int,
     title: str,
     marks: Array | None = None,
@@ -63,13 +63,13 @@ def _draw_around(
     return save(figure, path, title)
 
 
-def _patches_with(body: Body, lines: int) -> list[Patch]:
+def _patches_with(body: BodyLike, lines: int) -> list[Patch]:
     """Return the faces and sections of a body with as many spaces between parameter lines, 0 for no lines."""
     points = points_of(body).patches
     return patches_of(body, points, (len(points[0]) - 1) // lines if lines else 0)
 
 
-def draw_cut(path: str | Path | None, body: Body) -> Figure:
+def draw_cut(path: str | Path | None, body: BodyLike) -> Figure:
     """Draw the volume without one octant of the cube (the paper's Fig. 9): parameter lines, and the distortion.
 
     The octant and the view are those that show most of the cut. Of several patches the octants that lie in the upper
@@ -86,13 +86,13 @@ def draw_cut(path: str | Path | None, body: Body) -> Figure:
         panel.imshow(draw(visible(body, patches, left_out), view, PANEL))
     name_colors(figure, body)
     color_bar(figure, panels, field.limits, field.title)
-    if isinstance(body, MultiPatch):
+    if isinstance(body, Body):
         return save(figure, path, "Cut open: the upper octants of the patches, towards the viewer, are left out")
     u, v, w = np.argwhere(left_out[0])[0].tolist()
     return save(figure, path, f"Cut open: the octant {octant_label((u, v, w))} is left out")
 
 
-def draw_distortion(path: str | Path | None, body: Body) -> Figure:
+def draw_distortion(path: str | Path | None, body: BodyLike) -> Figure:
     """Draw tanh(sqrt(ARAP) / 2) at volume 1, as the paper colours it, on the images of u, v and w = 1/2.
 
     Of several patches each is measured against its own box, and drawn where the body is cut open in three ways.
@@ -105,21 +105,21 @@ def draw_distortion(path: str | Path | None, body: Body) -> Figure:
     ]
     show_inside(panels, body, points, patches)
     color_bar(figure, panels, field.limits, field.title)
-    several = isinstance(body, MultiPatch)
+    several = isinstance(body, Body)
     return save(figure, path, "Distortion of the patches inside" if several else "Distortion on the mid-sections")
 
 
-def draw_folds(path: str | Path | None, body: Body, places: Array) -> Figure:
+def draw_folds(path: str | Path | None, body: BodyLike, places: Array) -> Figure:
     """Draw the boundary as glass, and black balls at places (k, 3) inside: spans where det J's sign is not proved."""
     figure, (panels,) = panels_of(1, 2)
     show_around(panels, glass(body), places)
     return save(figure, path, f"The sign of det J is not proved on {len(places)} spans: black balls")
 
 
-def draw_meeting(path: str | Path | None, body: Body, meeting: Meeting) -> Figure:
+def draw_meeting(path: str | Path | None, body: BodyLike, meeting: Meeting) -> Figure:
     """Draw the place where the boundary meets itself: on the whole boundary, and the two parts there from two sides."""
     mark = np.array([meeting.point])
-    several, owners = as_multipatch(body).patches, meeting.patches or (0, 0)
+    several, owners = as_body(body).patches, meeting.patches or (0, 0)
     windows = [
         points_on(several[owner], face_window(parameter, WINDOW, SAMPLES))
         for owner, parameter in zip(owners, meeting.parameters, strict=True)
@@ -133,7 +133,7 @@ def draw_meeting(path: str | Path | None, body: Body, meeting: Meeting) -> Figur
     return save(figure, path, "The boundary meets itself at the black ball; the two parts near it")
 
 
-def glass(body: Body) -> list[Patch]:
+def glass(body: BodyLike) -> list[Patch]:
     """Return the outer faces as transparent patches."""
     points = points_of(body).patches
     return [plain_patch(points[k], "0.6", opacity=0.25) for k in outer_faces(body)]
@@ -142,7 +142,7 @@ def glass(body: Body) -> list[Patch]:
 PLOTS = {"faces": draw_faces, "lines": draw_lines, "cut": draw_cut, "distortion": draw_distortion}
 
 
-def plot_body(body: Body, what: str, file: str | Path | None) -> Figure:
+def plot_body(body: BodyLike, what: str, file: str | Path | None) -> Figure:
     """Return one of the figures PLOTS of a body, written to `file`, too, where one is named."""
     check_drawable(what, PLOTS)
     return PLOTS[what](file, body)

@@ -5,10 +5,10 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from parameterize.spline.multipatch import as_multipatch, size_of
+from parameterize.spline.body import BodyLike, as_body, size_of
 from solve import Modes
 
-from .evaluate import Body, all_grids, fields_on, flat, outer_faces
+from .evaluate import all_grids, fields_on, flat, outer_faces
 from .ranges import ColorRange
 from .render import Patch, draw, view_of
 from .style import PANEL, colors, panels_of, save
@@ -18,11 +18,11 @@ SAMPLES = 61  # a direction of a face
 SWING = 0.15  # of the body's size: the largest displacement as drawn
 
 
-def draw_modes(path: str | Path | None, body: Body, modes: Modes) -> Figure:
+def draw_modes(path: str | Path | None, body: BodyLike, modes: Modes) -> Figure:
     """Draw the first modes, displacements, and their frequencies; the size of each is free, and the same in all."""
     shown = list(zip(modes.frequencies, modes.shapes, strict=True))[:MOST]
     figure, axes = panels_of(-(-len(shown) // COLUMNS), min(COLUMNS, len(shown)))
-    volumes, grids = as_multipatch(body).patches, all_grids(SAMPLES)
+    volumes, grids = as_body(body).patches, all_grids(SAMPLES)
     size = size_of(volumes)
     faces = [(k // len(grids), grids[k % len(grids)]) for k in outer_faces(body)]
     still = [flat(volumes[number].grid(*grid)) for number, grid in faces]

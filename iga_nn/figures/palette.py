@@ -5,25 +5,25 @@ from collections.abc import Sequence
 from matplotlib import colormaps
 from matplotlib.colors import to_hex
 
-from parameterize.spline.multipatch import MultiPatch
+from parameterize.spline.body import Body, BodyLike
 from parameterize.spline.volume import FACE_NAMES
 
-from .evaluate import FACE_COLORS, Body, face_labels
+from .evaluate import FACE_COLORS, face_labels
 
 PATCH_COLORS = tuple(to_hex(color) for color in colormaps["tab20"].colors)  # type: ignore[attr-defined]
 NAMED = 4  # patches of one colour that its label names
 
 
-def face_colors(body: Body) -> list[str]:
+def face_colors(body: BodyLike) -> list[str]:
     """Return the colours of six faces of each patch: those of the faces of a volume; of several each patch has one."""
-    if not isinstance(body, MultiPatch):
+    if not isinstance(body, Body):
         return list(FACE_COLORS)
     return [PATCH_COLORS[i % len(PATCH_COLORS)] for i in range(len(body)) for _ in FACE_NAMES]
 
 
-def color_labels(body: Body) -> list[tuple[str, str]]:
+def color_labels(body: BodyLike) -> list[tuple[str, str]]:
     """Return the legend of the colours: each with a label such as "u0: u = 0", of several patches such as "p3, p23"."""
-    if not isinstance(body, MultiPatch):
+    if not isinstance(body, Body):
         return list(zip(FACE_COLORS, face_labels(), strict=True))
     names = [f"p{i}" for i in range(len(body))]
     alike = [names[i :: len(PATCH_COLORS)] for i in range(min(len(names), len(PATCH_COLORS)))]

@@ -11,15 +11,14 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch as Swatch
 
 from parameterize.arrays import Array, IntArray
+from parameterize.spline.body import Body, BodyLike, as_body
 from parameterize.spline.interface import axis_side, face_label
-from parameterize.spline.multipatch import MultiPatch, as_multipatch
 from parameterize.surface.geometry import normals_and_areas
 from parameterize.surface.surface import Surface
 from solve.forms.condition import Condition
 from solve.forms.frame import face_geometry
 from solve.forms.region import Region
 
-from .evaluate import Body
 from .render import Patch
 from .style import panels_of, save, show_around
 
@@ -31,19 +30,19 @@ LINES_UP_TO = 3_000  # triangles: surfaces with more are drawn without outlines
 LONGEST = 60  # letters of a name
 
 
-def draw_conditions(path: str | Path | None, body: Body, conditions: Sequence[Condition]) -> Figure:
+def draw_conditions(path: str | Path | None, body: BodyLike, conditions: Sequence[Condition]) -> Figure:
     """Draw where a problem's conditions hold on the body, from the front and from behind.
 
     conditions: with their regions placed. Where two meet, the first is shown.
     """
     palette, rows = _palette(len(conditions)), np.linspace(0.0, 1.0, SAMPLES)
     patches = []
-    several = as_multipatch(body)
+    several = as_body(body)
     faces = [(i, name) for i, names in enumerate(several.outer) for name in names]
     for number, name in faces:
         x, normal = face_geometry(several.patches[number], [rows] * 3, *axis_side(name))
         points = np.asarray(x)
-        own = face_label(number, name) if isinstance(body, MultiPatch) else name
+        own = face_label(number, name) if isinstance(body, Body) else name
         units = normal / np.linalg.norm(normal, axis=0)
         first = _first([condition.region for condition in conditions], points, units, own)
         patches.append(Patch(np.moveaxis(points, 0, -1), palette[first], every=SAMPLES - 1))

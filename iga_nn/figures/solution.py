@@ -8,7 +8,7 @@ from typing import Any
 from matplotlib.figure import Figure
 
 from parameterize.arrays import Array
-from parameterize.spline.multipatch import MultiPatch
+from parameterize.spline.body import Body, BodyLike
 from solve import Solution
 from solve.forms.boundary_value_problem import BoundaryValueProblem
 from solve.solution import MultiPatchSolution
@@ -16,7 +16,7 @@ from solve.solution import MultiPatchSolution
 from ..level_table import EXACT_ERRORS, TITLES
 from ..options import NO_UNITS, Units
 from .cutaway import cut_of, visible
-from .evaluate import Body, Solved, outer_faces
+from .evaluate import Solved, outer_faces
 from .fields import STRESS, Field, Samples, diagonal_of, error_of, fields_of, points_of, solution_of, vectors_of
 from .inside import show_inside
 from .ranges import with_unit
@@ -27,7 +27,7 @@ from .warp import in_words, warp_of
 
 def draw_error(
     path: str | Path | None,
-    body: Body,
+    body: BodyLike,
     solution: Solution | MultiPatchSolution,
     problem: BoundaryValueProblem,
     units: Units = NO_UNITS,
@@ -43,11 +43,11 @@ def draw_error(
     _write_numbers(rows[0][2], solution)
     show_inside(rows[1], body, points, patches)
     color_bar(figure, rows, field.limits, with_unit(r"$|u - u_h|$", units.displacement))
-    where = "inside" if isinstance(body, MultiPatch) else "on the mid-sections"
+    where = "inside" if isinstance(body, Body) else "on the mid-sections"
     return save(figure, path, f"Error on the boundary and {where}")
 
 
-def draw_solution(path: str | Path | None, body: Body, solution: Solved, units: Units = NO_UNITS) -> Figure:
+def draw_solution(path: str | Path | None, body: BodyLike, solution: Solved, units: Units = NO_UNITS) -> Figure:
     """Draw u_h on the boundary, in the body cut open and inside (`show_inside`); of an elastic body, the stress.
 
     An elastic body is drawn as its displacements deform it, enlarged by a factor that the title states.
@@ -65,7 +65,7 @@ def draw_solution(path: str | Path | None, body: Body, solution: Solved, units: 
 
 def draw_values(
     path: str | Path | None,
-    body: Body,
+    body: BodyLike,
     solution: Solved,
     title: str,
     *,
@@ -86,7 +86,7 @@ def moved_by(points: Samples, solution: Solved, factor: float) -> list[Array]:
 
 
 def _draw_values(
-    path: str | Path | None, body: Body, points: Sequence[Array], field: Field, label: str, heading: str = ""
+    path: str | Path | None, body: BodyLike, points: Sequence[Array], field: Field, label: str, heading: str = ""
 ) -> Figure:
     """Draw a field on the faces and sections of all patches at points (m, m, 3).
 

@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 
 from parameterize.arrays import Array
 from parameterize.files import replacing
+from parameterize.spline.body import BodyLike
 
-from .evaluate import MAP, Body
+from .evaluate import MAP
 from .palette import color_labels
 from .ranges import ColorRange
 from .render import NAMELESS, Patch, draw, view_of, widest_view
@@ -67,7 +68,7 @@ def show_section(panel: Any, title: str, points: Array, colors: Array) -> None:
     panel.set_title(title, fontsize=13)
 
 
-def name_colors(figure: Figure, body: Body) -> None:
+def name_colors(figure: Figure, body: BodyLike) -> None:
     """Write the legend of the colours of a volume's faces, or of several patches, below the panels."""
     swatches = [Swatch(color=color, label=label) for color, label in color_labels(body)]
     figure.legend(

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from parameterize.files import replacing
-from parameterize.spline.multipatch import TOLERANCE, MultiPatch, as_multipatch, shared_numbers
+from parameterize.spline.body import TOLERANCE, Body, BodyLike, as_body, shared_numbers
 from parameterize.spline.volume import BSplineVolume
 from parameterize.surface.readers.file import FORMATS as SURFACES
 from solve.discretization.space import TrialSpace, longest_edge
@@ -26,7 +26,7 @@ from solve.field import MultiPatchField, SplineField
 from solve.forms.boundary_value_problem import BoundaryValueProblem
 
 from ..errors import InputError, did_you_mean, input_errors
-from ..figures.evaluate import Body, Solved, fields_on
+from ..figures.evaluate import Solved, fields_on
 from ..new_file import check_new
 from ..options import PROBLEMS
 from ..report import document as reports
@@ -89,7 +89,7 @@ def _holds_arrays(path: Path) -> bool:
         return False
 
 
-def load_volume(path: str | Path, tolerance: float = TOLERANCE) -> BSplineVolume | MultiPatch:
+def load_volume(path: str | Path, tolerance: float = TOLERANCE) -> BodyLike:
     """Return the volume of a volume.npz, G+Smo XML, MFEM NURBS mesh, GeoPDEs geometry file or splinepy JSON.
 
     The kinds are recognized by their beginnings.
@@ -104,8 +104,8 @@ def load_volume(path: str | Path, tolerance: float = TOLERANCE) -> BSplineVolume
 
     Returns
     -------
-    BSplineVolume or MultiPatch
-        A MultiPatch of a file with several patches, or with one that is glued to itself.
+    BSplineVolume or Body
+        A Body of a file with several patches, or with one that is glued to itself.
 
     Raises
     ------
@@ -135,19 +135,19 @@ def load_volume(path: str | Path, tolerance: float = TOLERANCE) -> BSplineVolume
         if kind is None and source.suffix != ".npz":
             raise InputError(f"{source}: is not a spline volume; create one with `iga-nn run poisson {source}`")
         body = read_body(source, kind, tolerance) if kind in READERS else _load_archive(source)
-    if isinstance(body, MultiPatch) and (near := body.nearly_glued):
+    if isinstance(body, Body) and (near := body.nearly_glued):
         pairs = ", ".join(f"{pair} ({distance:.2g} apart)" for pair, distance in near[:SHOWN])
         more = f" and {len(near) - SHOWN} more" if len(near) > SHOWN else ""
         log.warning("%s: faces that nearly match are not glued: %s%s; a larger tolerance glues them", path, pairs, more)
-    rows = [row for patch in as_multipatch(body) for row in patch.knots]
+    rows = [row for patch in as_body(body) for row in patch.knots]
     if min(float(np.diff(np.unique(row)).min()) for row in rows) < NARROWEST:
         raise InputError(f"{path}: has a knot span narrower than {NARROWEST:g}: derivatives there overflow; widen it")
     return body
 
 
-def _load_archive(path: Path) -> BSplineVolume | MultiPatch:
+def _load_archive(path: Path) -> BodyLike:
     """Return what a volume.npz holds, a body where it has interfaces."""
-    body = MultiPatch.load(path)
+    body = Body.load(path)
     return body if len(body) > 1 or body.interfaces else body.patches[0]
 
 
@@ -214,7 +214,7 @@ def export(
         if file.exists() and not force:
             raise InputError(f"{file}: exists; --force replaces it, --out names another file")
     loaded = load_volume(volume)
-    if solution is not None and to == "mfem" and isinstance(loaded, MultiPatch):
+    if solution is not None and to == "mfem" and isinstance(loaded, Body):
         raise InputError(f"{volume}: has several patches; a solution on these goes to vtk, view, gismo or json")
     field, problem = (None, None) if solution is None else _load_solution(Path(solution), loaded)
     try:
@@ -228,20 +228,20 @@ def export(
     return target
 
 
-def load_field(path: Path, body: Body) -> Solved:
+def load_field(path: Path, body: BodyLike) -> Solved:
     """Return the field of solution.npz on a body of one patch or several.
 
     Raises ValueError or OSError for a file that holds none for so many.
     """
-    return MultiPatchField.load(path) if isinstance(body, MultiPatch) else SplineField.load(path)
+    return MultiPatchField.load(path) if isinstance(body, Body) else SplineField.load(path)
 
 
-def _load_solution(path: Path, body: Body) -> tuple[Solved, BoundaryValueProblem | None]:
+def _load_solution(path: Path, body: BodyLike) -> tuple[Solved, BoundaryValueProblem | None]:
     """Return a solution and the problem in the report beside it, None for a problem that is not known.
 
     Raises InputError where the solution does not belong to the body: by its knots, or by the h of its report.
     """
-    several = as_multipatch(body)
+    several = as_body(body)
     with input_errors():
         found = load_field(path, body)
     fields = fields_on(found)
@@ -279,7 +279,7 @@ def _stated(name: str, section: dict[str, Any]) -> BoundaryValueProblem | None:
         return None
 
 
-def _mesh_size(section: dict[str, Any], body: MultiPatch, fields: Sequence[SplineField]) -> float | None:
+def _mesh_size(section: dict[str, Any], body: Body, fields: Sequence[SplineField]) -> float | None:
     """Return h of the finest level, None where the section is not the fields', is empty or was edited."""
     try:
         count = shared_numbers([field.coefficients.shape for field in fields], body.interfaces)[1]

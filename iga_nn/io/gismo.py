@@ -15,8 +15,8 @@ from xml.etree import ElementTree
 from xml.etree.ElementTree import Element, SubElement
 
 from parameterize.arrays import Array
+from parameterize.spline.body import Body, BodyLike, as_body
 from parameterize.spline.interface import Face, Interface, axis_side, varying
-from parameterize.spline.multipatch import MultiPatch, as_multipatch
 from parameterize.spline.volume import FACE_NAMES, BSplineVolume
 from solve.field import MultiPatchField, SplineField
 
@@ -166,18 +166,18 @@ def _numbers(node: Element, what: str) -> Array:
     return finite_numbers((node.text or "").split(), what)
 
 
-def write_gismo(path: Path, spline: BSplineVolume | MultiPatch, *_: object) -> None:
+def write_gismo(path: Path, spline: BodyLike, *_: object) -> None:
     """Write a body as G+Smo XML, which has no place for more."""
-    body = as_multipatch(spline)
+    body = as_body(spline)
     root = _with_topology(body)
     for number, patch in enumerate(body):
         _add_patch(root, number, patch, patch.control_points, patch.weights)
     _save(path, root)
 
 
-def write_gismo_field(path: Path, solution: SplineField | MultiPatchField, spline: BSplineVolume | MultiPatch) -> None:
+def write_gismo_field(path: Path, solution: SplineField | MultiPatchField, spline: BodyLike) -> None:
     """Write a solution on a body as G+Smo XML."""
-    root = _with_topology(as_multipatch(spline))
+    root = _with_topology(as_body(spline))
     for number, field in enumerate(solution.patches if isinstance(solution, MultiPatchField) else [solution]):
         _add_patch(root, number, field, field.coefficients, None)
     _save(path, root)
@@ -189,7 +189,7 @@ def _save(path: Path, root: Element) -> None:
     path.write_text(f'<?xml version="1.0" encoding="UTF-8"?>\n{text}\n', encoding="utf-8")
 
 
-def _with_topology(body: MultiPatch) -> Element:
+def _with_topology(body: Body) -> Element:
     """Return a file's root with the numbers of the patches, their interfaces and their outer faces."""
     root = Element("xml")
     node = SubElement(root, "MultiPatch", parDim="3", id="0")

@@ -16,8 +16,8 @@ from pathlib import Path
 import numpy as np
 
 from parameterize.arrays import Array, Floats, IntArray
+from parameterize.spline.body import Body, BodyLike, as_body, shared_numbers
 from parameterize.spline.interface import Interface, axis_side
-from parameterize.spline.multipatch import MultiPatch, as_multipatch, shared_numbers
 from parameterize.spline.orientation import orientation
 from parameterize.spline.volume import BSplineVolume
 from solve.field import SplineField
@@ -32,14 +32,14 @@ log = logging.getLogger(__name__)
 ATTRIBUTES = ("w0", "w1", "v0", "u1", "v1", "u0")  # the faces by their boundary attributes, from 1
 
 
-def write_mfem(path: Path, volume: BSplineVolume | MultiPatch, solution: SplineField | None = None, *_: object) -> None:
+def write_mfem(path: Path, volume: BodyLike, solution: SplineField | None = None, *_: object) -> None:
     """Write a volume or a body as an MFEM NURBS mesh, on the knots of the solution where there is one.
 
     Raises InputError where the degrees of the solution differ, or MFEM has no way to tell the edges of a body apart.
     """
-    given = as_multipatch(volume)
+    given = as_body(volume)
     if solution is not None:
-        given = MultiPatch((_on_knots_of(solution, given.patches[0]),))
+        given = Body((_on_knots_of(solution, given.patches[0]),))
     body = right_handed(given)
     if any(patch is not other for patch, other in zip(body, given, strict=True)):
         log.warning("the volume is left-handed, which MFEM does not take: written with w reversed, w0 and w1 exchanged")
@@ -69,7 +69,7 @@ def write_mfem(path: Path, volume: BSplineVolume | MultiPatch, solution: SplineF
 def write_mfem_field(path: Path, field: SplineField, volume: BSplineVolume) -> None:
     """Write a solution as an MFEM grid function on the mesh that `write_mfem` makes of it and its volume."""
     map_there = _on_knots_of(field, volume)
-    layout, knots = _layout_of(right_handed(MultiPatch((map_there,))))
+    layout, knots = _layout_of(right_handed(Body((map_there,))))
     (place,) = layout.numbers([len(row) - degree - 1 for degree, row in knots])
     coefficients = _backwards(field.coefficients) if orientation(map_there) < 0 else field.coefficients
     values = np.empty((place.size, int(np.prod(coefficients.shape[3:]))))
@@ -87,13 +87,13 @@ def _on_knots_of(field: SplineField, volume: BSplineVolume) -> BSplineVolume:
     return volume.on_knots(field.knots)
 
 
-def right_handed(body: MultiPatch) -> MultiPatch:
+def right_handed(body: Body) -> Body:
     """Return the same body with w reversed in its left-handed patches; the others stay the same objects."""
     left = [orientation(patch) < 0 for patch in body]
     if not any(left):
         return body
     patches = [_with_w_reversed(patch) if back else patch for patch, back in zip(body, left, strict=True)]
-    return MultiPatch(tuple(patches), tuple(_between(interface, left) for interface in body.interfaces))
+    return Body(tuple(patches), tuple(_between(interface, left) for interface in body.interfaces))
 
 
 def _with_w_reversed(patch: BSplineVolume) -> BSplineVolume:
@@ -120,7 +120,7 @@ def _between(interface: Interface, left: Sequence[bool]) -> Interface:
     return replace(interface, first=ends[0], second=ends[1], flipped=(flipped[0], flipped[1]))
 
 
-def _outer(body: MultiPatch) -> Iterator[tuple[int, str]]:
+def _outer(body: Body) -> Iterator[tuple[int, str]]:
     """Yield patch and name of the faces that are not glued."""
     for number, faces in enumerate(body.outer):
         for face in faces:
@@ -142,7 +142,7 @@ def _space(components: int) -> list[str]:
     return ["FiniteElementSpace", "FiniteElementCollection: NURBS", f"VDim: {components}", "Ordering: 1", ""]
 
 
-def _layout_of(body: MultiPatch) -> tuple[Layout, list[KnotVector]]:
+def _layout_of(body: Body) -> tuple[Layout, list[KnotVector]]:
     """Return the hexahedra of a body, and its knot vectors. Raises InputError where MFEM cannot hold the body."""
     cubes = np.array(shared_numbers([(2, 2, 2)] * len(body), body.interfaces)[0])
     rows = np.stack([cubes[:, i, j, k] for i, j, k in CORNERS], axis=1)
@@ -157,7 +157,7 @@ def _layout_of(body: MultiPatch) -> tuple[Layout, list[KnotVector]]:
         raise _cannot_hold() from None
 
 
-def _edges(body: MultiPatch, cubes: IntArray) -> tuple[IntArray, list[KnotVector]]:
+def _edges(body: Body, cubes: IntArray) -> tuple[IntArray, list[KnotVector]]:
     """Return the edges (m, 3) of a body, each with its knot vector, start and end, and the knot vectors.
 
     Edges that lie opposite each other in a patch have the same knot vector. It runs from the lower to the higher vertex
@@ -181,9 +181,9 @@ def _edges(body: MultiPatch, cubes: IntArray) -> tuple[IntArray, list[KnotVector
     return np.array([[number, *sorted(pair)] for number, *pair in listed.values()]), knots
 
 
-def _demand_same(body: MultiPatch, places: Sequence[IntArray]) -> None:
+def _demand_same(body: Body, places: Sequence[IntArray]) -> None:
     """Raise InputError where MFEM would take other control points for one than the interfaces do."""
-    labels, count = shared_numbers([patch.shape for patch in body], body.interfaces)
+    labels, count = body.numbering
     ours, theirs = (np.concatenate([row.ravel() for row in rows]) for rows in (labels, places))
     if len(np.unique(np.stack([ours, theirs]), axis=1).T) != count or len(np.unique(theirs)) != count:
         raise _cannot_hold()

@@ -6,8 +6,8 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from parameterize.arrays import Array
+from parameterize.spline.body import FLAT, TOLERANCE, Body, BodyLike, net_area
 from parameterize.spline.interface import Face, face_label, face_layer, gap, orientations
-from parameterize.spline.multipatch import FLAT, TOLERANCE, MultiPatch, net_area, size_of
 from parameterize.spline.volume import LARGEST, BSplineVolume
 
 log = logging.getLogger(__name__)
@@ -66,21 +66,21 @@ def as_text(rows: Array) -> str:
 
 def body_of(
     patches: Sequence[BSplineVolume], declared: Iterable[tuple[Face, Face]] = (), tolerance: float = TOLERANCE
-) -> BSplineVolume | MultiPatch:
+) -> BodyLike:
     """Return one volume, or the patches with the interfaces that their control points show.
 
-    declared: pairs of faces that the file says are glued. tolerance: as in `MultiPatch.from_patches`. Raises ValueError
+    declared: pairs of faces that the file says are glued. tolerance: as in `Body.from_patches`. Raises ValueError
     where the two faces of a pair are apart, and where the patches do not fit together. Interfaces that the file does
     not name, though it names others, are glued with a notice.
     """
     if not patches:
         raise ValueError("holds no patch")
-    body = MultiPatch.from_patches(patches, tolerance)
+    body = Body.from_patches(patches, tolerance)
     _compare(body, [frozenset(pair) for pair in declared])
     return body if len(body) > 1 or body.interfaces else body.patches[0]
 
 
-def _compare(body: MultiPatch, declared: Sequence[frozenset[Face]]) -> None:
+def _compare(body: Body, declared: Sequence[frozenset[Face]]) -> None:
     """Compare the interfaces of a body with those that its file declares."""
     found = {frozenset((interface.first, interface.second)) for interface in body.interfaces}
     for pair in declared:
@@ -92,7 +92,7 @@ def _compare(body: MultiPatch, declared: Sequence[frozenset[Face]]) -> None:
             apart = min(gap(body.patches, way) for way in orientations(faces[0], faces[-1]))
             reason = "or weights do not fit together"
             if np.isfinite(apart):
-                share = apart / size_of(body)
+                share = apart / body.size
                 close = f"; load_volume(path, tolerance={1.1 * share:.1e}) makes them one" if share < CLOSE else ""
                 reason = f"are {apart:.3g} apart, {share:.1e} of the body's size{close}"
             raise ValueError(f"interface {names}: the file says that they are one, but their control points {reason}")
@@ -101,7 +101,7 @@ def _compare(body: MultiPatch, declared: Sequence[frozenset[Face]]) -> None:
         log.warning("%s: glued, for their control points are the same, though the file does not list them", names)
 
 
-def _has_area(body: MultiPatch, face: Face) -> bool:
+def _has_area(body: Body, face: Face) -> bool:
     """Return whether a face is a surface, and not shrunk to an edge or a point, where nothing is glued."""
     net = face_layer(body.patches[face[0]].control_points, face[1])
-    return net_area(net) > FLAT * size_of(body) ** 2
+    return net_area(net) > FLAT * body.size**2

@@ -5,8 +5,8 @@ import zlib
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
+from parameterize.spline.body import BodyLike
 from parameterize.spline.interface import Face
-from parameterize.spline.multipatch import MultiPatch
 from parameterize.spline.volume import BSplineVolume
 
 from . import geopdes, gismo, mfem, splinepy
@@ -52,10 +52,10 @@ def _unpacked(packed: bytes) -> bytes:
         return b""
 
 
-def read_body(path: Path, kind: str, tolerance: float) -> BSplineVolume | MultiPatch:
+def read_body(path: Path, kind: str, tolerance: float) -> BodyLike:
     """Return the volume of a file of one patch, the body of several patches with their interfaces.
 
-    kind: one of READERS. tolerance: as in `MultiPatch.from_patches`. Raises OSError, and ValueError where the file is
+    kind: one of READERS. tolerance: as in `Body.from_patches`. Raises OSError, and ValueError where the file is
     damaged, or its patches do not fit together.
     """
     try:

@@ -14,8 +14,8 @@ from typing import Any
 
 import numpy as np
 
+from parameterize.spline.body import Body, BodyLike, as_body
 from parameterize.spline.interface import Face, Interface
-from parameterize.spline.multipatch import MultiPatch, as_multipatch
 from parameterize.spline.volume import FACE_NAMES, BSplineVolume
 from solve.field import MultiPatchField, SplineField
 
@@ -66,13 +66,13 @@ def _named(number: int, spline: Any) -> BSplineVolume:
         raise ValueError(f"spline {number}: {error}") from None
 
 
-def write_json(path: Path, spline: BSplineVolume | MultiPatch | SplineField | MultiPatchField, *_: object) -> None:
+def write_json(path: Path, spline: BodyLike | SplineField | MultiPatchField, *_: object) -> None:
     """Write a volume, a body or a solution as splinepy's JSON, which has no place for more."""
     shown: Sequence[BSplineVolume | SplineField]
     if isinstance(spline, SplineField | MultiPatchField):
         shown = spline.patches if isinstance(spline, MultiPatchField) else [spline]
     else:
-        shown = as_multipatch(spline).patches
+        shown = as_body(spline).patches
     _splinepy().io.json.export(str(path), [to_splinepy(one) for one in shown])
 
 
@@ -101,7 +101,7 @@ def to_splinepy(spline: BSplineVolume | SplineField) -> Any:
     return splinepy.NURBS(*parts, fastest_first(spline.control_points), fastest_first(spline.weights))
 
 
-def body_from_splinepy(splines: Any) -> MultiPatch:
+def body_from_splinepy(splines: Any) -> Body:
     """Return the body of a splinepy.Multipatch, or of a list of splines; interfaces are those of the control points.
 
     Raises TypeError for other objects, ValueError where the splines are no volumes or do not fit together.
@@ -109,10 +109,10 @@ def body_from_splinepy(splines: Any) -> MultiPatch:
     listed = splines.patches if isinstance(splines, _splinepy().Multipatch) else splines
     if not isinstance(listed, Iterable):
         raise TypeError(f"splines must be a splinepy.Multipatch or a list of splines, got {type(splines).__name__}")
-    return MultiPatch.from_patches([from_splinepy(spline) for spline in listed])
+    return Body.from_patches([from_splinepy(spline) for spline in listed])
 
 
-def body_to_splinepy(body: MultiPatch) -> Any:
+def body_to_splinepy(body: Body) -> Any:
     """Return a body as a splinepy.Multipatch with its interfaces. Raises InputError without splinepy."""
     patches = _splinepy().Multipatch([to_splinepy(patch) for patch in body])
     neighbours = np.full((len(body), len(FACE_NAMES)), -1, dtype=np.int32)

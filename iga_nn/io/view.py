@@ -19,8 +19,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from parameterize.arrays import Array
+from parameterize.spline.body import Body, BodyLike, as_body
 from parameterize.spline.bspline import divided_spans
-from parameterize.spline.multipatch import MultiPatch, as_multipatch
 from parameterize.spline.orientation import orientation
 from parameterize.spline.volume import BSplineVolume
 from solve.field import Points, SplineField
@@ -30,7 +30,7 @@ from solve.quantities import on_grid
 from solve.solution import MultiPatchSolution, Solution
 
 from ..errors import InputError, one_line
-from ..figures.evaluate import Body, Grid, Solved, arap_of, error_at, fields_on, problems_on
+from ..figures.evaluate import Grid, Solved, arap_of, error_at, fields_on, problems_on
 from .vtk import bezier_cells, breaks_of, save
 
 if TYPE_CHECKING:
@@ -49,7 +49,7 @@ TENSOR = {"XX": (0, 0), "YY": (1, 1), "ZZ": (2, 2), "XY": (0, 1), "YZ": (1, 2), 
 
 def write_view(
     path: Path,
-    body: Body,
+    body: BodyLike,
     solution: Solved | None = None,
     problem: BoundaryValueProblem | None = None,
     samples: int | None = None,
@@ -87,7 +87,7 @@ def write_solution(path: Path, solution: Solution | MultiPatchSolution) -> int:
 
 
 def grid(
-    body: Body,
+    body: BodyLike,
     solution: Solved | None = None,
     problem: BoundaryValueProblem | None = None,
     samples: int | None = None,
@@ -123,16 +123,16 @@ class _Part:
     problem: BoundaryValueProblem | None
 
 
-def _parts(body: Body, solution: Solved | None, problem: BoundaryValueProblem | None) -> list[_Part]:
-    volumes = as_multipatch(body).patches
+def _parts(body: BodyLike, solution: Solved | None, problem: BoundaryValueProblem | None) -> list[_Part]:
+    volumes = as_body(body).patches
     fields = [None] * len(volumes) if solution is None else fields_on(solution)
     problems = [None] * len(volumes) if problem is None else problems_on(problem, body)
     return [_Part(*part) for part in zip(volumes, arap_of(body), fields, problems, strict=True)]
 
 
-def _joined(body: Body, grids: Sequence[pyvista.UnstructuredGrid]) -> pyvista.UnstructuredGrid:
+def _joined(body: BodyLike, grids: Sequence[pyvista.UnstructuredGrid]) -> pyvista.UnstructuredGrid:
     """Return the grids of all patches as one, with the number of each cell's patch."""
-    if not isinstance(body, MultiPatch):
+    if not isinstance(body, Body):
         return grids[0]
     import pyvista
 

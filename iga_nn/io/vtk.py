@@ -29,6 +29,7 @@ from scipy.sparse import csr_array
 
 from parameterize.arrays import Array, IntArray
 from parameterize.spline.bernstein import elevation, extraction
+from parameterize.spline.body import Body, BodyLike, as_body, shared_numbers
 from parameterize.spline.bspline import (
     apply_along,
     evaluate_grid,
@@ -38,7 +39,6 @@ from parameterize.spline.bspline import (
     sparse_rows,
 )
 from parameterize.spline.interface import WEIGHT_TOLERANCE, Interface, face_layer
-from parameterize.spline.multipatch import MultiPatch, as_multipatch, shared_numbers
 from parameterize.spline.orientation import orientation
 from parameterize.spline.rational import projected
 from parameterize.spline.volume import BSplineVolume
@@ -52,7 +52,7 @@ BEZIER_HEXAHEDRON = 79
 
 def write_bezier(
     path: Path,
-    body: BSplineVolume | MultiPatch,
+    body: BodyLike,
     solution: SplineField | MultiPatchField | None = None,
     *_: object,
 ) -> None:
@@ -60,17 +60,15 @@ def write_bezier(
     save(path, bezier_cells(body, solution))
 
 
-def bezier_cells(
-    body: BSplineVolume | MultiPatch, solution: SplineField | MultiPatchField | None
-) -> pyvista.UnstructuredGrid:
+def bezier_cells(body: BodyLike, solution: SplineField | MultiPatchField | None) -> pyvista.UnstructuredGrid:
     """Return the cells of all patches; of several also the number of each cell's patch as the cell data `patch`.
 
     Neighbours share the points of their interface where these have the same weights, so that the surface of the grid is
     that of the body. Where the weights of two faces differ by a factor, each patch keeps points of its own.
     """
-    fields = solution.patches if isinstance(solution, MultiPatchField) else (solution,) * len(as_multipatch(body))
-    grids = [exact_cells(patch, field) for patch, field in zip(as_multipatch(body), fields, strict=True)]
-    if not isinstance(body, MultiPatch):
+    fields = solution.patches if isinstance(solution, MultiPatchField) else (solution,) * len(as_body(body))
+    grids = [exact_cells(patch, field) for patch, field in zip(as_body(body), fields, strict=True)]
+    if not isinstance(body, Body):
         return grids[0]
     degrees = [grid.cell_data["HigherOrderDegrees"][0].astype(int).tolist() for grid in grids]
     spans = [[len(row) - 1 for row in breaks_of(*pair)] for pair in zip(body, fields, strict=True)]

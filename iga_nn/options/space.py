@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING
 from ..errors import InputError
 
 if TYPE_CHECKING:
-    from parameterize.spline.multipatch import MultiPatch
-    from parameterize.spline.volume import BSplineVolume
+    from parameterize.spline.body import BodyLike
 
 MAX_REFINE = 6
 MAX_DOFS = 20_000_000  # some 15 GB at degree 3
@@ -34,17 +33,15 @@ def check_level(level: int) -> None:
         raise InputError(f"refine {level}: at most {MAX_REFINE}; each level has 8 times the unknowns")
 
 
-def check_size(
-    body: BSplineVolume | MultiPatch, refine: int, degree: int | None, components: int = 1, processes: int = 1
-) -> int:
+def check_size(body: BodyLike, refine: int, degree: int | None, components: int = 1, processes: int = 1) -> int:
     """Return the number of unknowns on a mesh of the body, those at interfaces counted for each patch.
 
     Raises InputError where there are too many unknowns for this number of processes.
     """
-    from parameterize.spline.multipatch import as_multipatch
+    from parameterize.spline.body import as_body
     from solve.discretization.space import trial_space
 
-    dofs = components * sum(trial_space(patch, refine, degree).dofs for patch in as_multipatch(body))
+    dofs = components * sum(trial_space(patch, refine, degree).dofs for patch in as_body(body))
     if dofs > (most := MAX_DOFS * processes):
         raise InputError(f"refine {refine} gives {dofs:,} unknowns, more than {most:,}: lower refine or degree")
     return dofs

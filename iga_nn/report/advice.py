@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from parameterize.arrays import Array, IntArray, in_brackets
-from parameterize.certificate.jacobian import Certificate
+from parameterize.certificate.jacobian import PatchCertificate
 from parameterize.config import MAX_CONTROL_POINTS
 from parameterize.spline.bspline import midpoints
 from parameterize.spline.volume import BSplineVolume
@@ -26,7 +26,7 @@ def span_places(volume: BSplineVolume, spans: IntArray) -> Array:
     return volume(span_parameters(volume, spans)) if len(spans) else np.empty((0, 3))
 
 
-def unproved(volume: BSplineVolume, certificate: Certificate) -> dict[str, Any]:
+def unproved(volume: BSplineVolume, certificate: PatchCertificate) -> dict[str, Any]:
     """Return an entry of the section `parameterization`: the number of spans without a proof, and some of their places.
 
     The first place is the worst fold found, where there is one; `flat` a point where det J is zero.

@@ -7,12 +7,12 @@ from html import escape
 from typing import Any
 
 from parameterize.arrays import Array, in_brackets
-from parameterize.certificate.body import BodyCertificate
-from parameterize.certificate.jacobian import Certificate
+from parameterize.certificate.body import Certificate
+from parameterize.certificate.jacobian import PatchCertificate
 from parameterize.quality.distortion import BoxDistortion
 from parameterize.quality.quality import BothScales, QualityReport
+from parameterize.spline.body import Body, all_control_points
 from parameterize.spline.bspline import breakpoints
-from parameterize.spline.multipatch import MultiPatch, all_control_points, shared_numbers
 from parameterize.spline.volume import BSplineVolume
 from parameterize.surface.surface import Surface
 from solve.solution import MultiPatchSolution, Solution
@@ -54,13 +54,13 @@ def _volume(volume: BSplineVolume) -> str:
 
 
 @as_html.register
-def _body(body: MultiPatch) -> str:
+def _body(body: Body) -> str:
     net = all_control_points(body)
     facts = [
         ("patches", str(len(body))),
         ("interfaces", str(len(body.interfaces))),
         ("outer faces", str(sum(map(len, body.outer)))),
-        ("control points", f"{shared_numbers([patch.shape for patch in body], body.interfaces)[1]:,}"),
+        ("control points", f"{body.numbering[1]:,}"),
         ("lies within", _ends(net.min(axis=0), net.max(axis=0))),
     ]
     return _table("Body of several patches", facts)
@@ -68,6 +68,15 @@ def _body(body: MultiPatch) -> str:
 
 @as_html.register
 def _certificate(certificate: Certificate) -> str:
+    if len(certificate.patches) == 1 and not certificate.misglued:
+        return _of_patch(certificate.only)
+    facts = [("volume", f"{certificate.volume:.6g}")]
+    if certificate.verdict == "certified":
+        facts.append(("|det J| is at least", f"{certificate.lower_bound:.3g} of its mean"))
+    return _table(f"{len(certificate.patches)} patches: {certificate.verdict}", facts) + _list(certificate.defects)
+
+
+def _of_patch(certificate: PatchCertificate) -> str:
     facts = [("volume", f"{certificate.mean_det:.6g}")]
     if certificate.verdict == "certified":
         facts.append(("det J is at least", f"{certificate.lower_bound:.3g} of its mean"))
@@ -78,14 +87,6 @@ def _certificate(certificate: Certificate) -> str:
     if certificate.witness is not None:
         facts.append(("folded at u, v, w", in_brackets(certificate.witness)))
     return _table(f"{certificate.claim}: {certificate.verdict}", facts)
-
-
-@as_html.register
-def _body_certificate(certificate: BodyCertificate) -> str:
-    facts = [("volume", f"{certificate.volume:.6g}")]
-    if certificate.verdict == "certified":
-        facts.append(("|det J| is at least", f"{certificate.lower_bound:.3g} of its mean"))
-    return _table(f"{len(certificate.patches)} patches: {certificate.verdict}", facts) + _list(certificate.defects)
 
 
 @as_html.register

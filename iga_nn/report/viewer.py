@@ -19,16 +19,16 @@ from matplotlib import colormaps
 from numpy.typing import NDArray
 
 from parameterize.arrays import Array, Knots, Mask
+from parameterize.spline.body import Body, BodyLike, as_body
 from parameterize.spline.bspline import breakpoints
 from parameterize.spline.interface import face_label
-from parameterize.spline.multipatch import MultiPatch, as_multipatch
 from parameterize.spline.volume import AXES, FACE_NAMES
 from solve.forms.boundary_value_problem import BoundaryValueProblem
 from solve.forms.form import Quantity
 
 from ..figures import evaluate
 from ..figures.cutaway import cut_of, patches_of, seen_quarters
-from ..figures.evaluate import PER_PATCH, Body, Solved, fields_on, outer_faces
+from ..figures.evaluate import PER_PATCH, Solved, fields_on, outer_faces
 from ..figures.fields import (
     MANY,
     STRESS,
@@ -95,7 +95,7 @@ class Frame:
 
 
 def scene_of(
-    body: Body,
+    body: BodyLike,
     solution: Solved | None = None,
     problem: BoundaryValueProblem | None = None,
     *,
@@ -121,7 +121,7 @@ def _with_unit(field: Field, units: Units) -> Field:
 
 
 def scene_of_frames(
-    body: Body,
+    body: BodyLike,
     frames: Sequence[Frame],
     *,
     oscillates: bool = False,
@@ -186,9 +186,9 @@ class Drawn:
         return {"faces": _packed(shares(faces)), "lattice": _packed(shares(lattices))}
 
 
-def _scene(body: Body, frames: Sequence[Frame], coarser: int) -> Scene:
+def _scene(body: BodyLike, frames: Sequence[Frame], coarser: int) -> Scene:
     """Return a scene of frames with the same fields; the distortion of the body joins the first frame's fields."""
-    points, patches = points_of(body), as_multipatch(body).patches
+    points, patches = points_of(body), as_body(body).patches
     drawn = Drawn(outer_faces(body), coarser if len(patches) <= MANY else 1)  # many have few samples already
     cloud = np.concatenate([where.reshape(-1, 3) for where in points.everywhere])
     low, high = cloud.min(axis=0), cloud.max(axis=0)
@@ -206,7 +206,7 @@ def _scene(body: Body, frames: Sequence[Frame], coarser: int) -> Scene:
         "outer": [divmod(k, PER_PATCH) for k in drawn.faces],  # patch and face
         "cut": _cut(list(seen_quarters(body, left_out)), drawn.faces),
         "places": drawn.packed(points, lambda where: (where - low) / np.where(high > low, high - low, 1.0)),
-        "axes": [] if isinstance(body, MultiPatch) else list(AXES),  # along which there are sections through the cube
+        "axes": [] if isinstance(body, Body) else list(AXES),  # along which there are sections through the cube
         "spans": [[breakpoints(row).tolist() for row in rows] for rows in knots],
         **_colors(body, drawn.faces),
         "map": _packed(colormaps[evaluate.MAP](np.arange(256))[:, :3], np.uint8),  # (256, 3)
@@ -236,10 +236,10 @@ def _bits(quarters: Mask) -> int:
     return int(quarters.ravel() @ (1 << np.arange(4)))
 
 
-def _colors(body: Body, outer: Sequence[int]) -> dict[str, Any]:
+def _colors(body: BodyLike, outer: Sequence[int]) -> dict[str, Any]:
     """Return the colours and the names of the outer faces, and the legend of the colours."""
     colors, labels = np.reshape(face_colors(body), (-1, len(FACE_NAMES))), evaluate.face_labels()
-    if isinstance(body, MultiPatch):
+    if isinstance(body, Body):
         labels = [face_label(i, name) for i in range(len(body)) for name in FACE_NAMES]
     named = np.reshape(labels, (-1, len(FACE_NAMES)))
     return {

@@ -19,7 +19,7 @@ from pathlib import Path
 import numpy as np
 
 from parameterize.config import Config, SplineConfig
-from parameterize.spline.multipatch import MultiPatch, as_multipatch
+from parameterize.spline.body import Body, BodyLike, as_body
 from parameterize.spline.volume import BSplineVolume
 from parameterize.surface.surface import Surface
 from solve.discretization.errors import POINTS
@@ -251,9 +251,9 @@ class SolveMemory:
         return self.shared_mb / processes + self.each_mb
 
 
-def solve_memory(body: BSplineVolume | MultiPatch, problem: BoundaryValueProblem, options: SolveOptions) -> SolveMemory:
+def solve_memory(body: BodyLike, problem: BoundaryValueProblem, options: SolveOptions) -> SolveMemory:
     """Return the forecast for one solve: the sum over the patches of a body."""
-    parts = zip(as_multipatch(body), problems_on(problem, body), strict=True)
+    parts = zip(as_body(body), problems_on(problem, body), strict=True)
     found = [_patch_memory(patch, own, options) for patch, own in parts]
     return SolveMemory(sum(one.shared_mb for one in found), sum(one.each_mb for one in found))
 
@@ -271,7 +271,7 @@ def _patch_memory(volume: BSplineVolume, problem: BoundaryValueProblem, options:
     return SolveMemory(8e-6 * shared, 8e-6 * each)
 
 
-def tell_memory(body: BSplineVolume | MultiPatch, problem: BoundaryValueProblem, options: SolveOptions) -> None:
+def tell_memory(body: BodyLike, problem: BoundaryValueProblem, options: SolveOptions) -> None:
     """Log the memory of a solve.
 
     Where it is not free, warn, and name the number of processes that could solve the problem.
@@ -286,8 +286,8 @@ def tell_memory(body: BSplineVolume | MultiPatch, problem: BoundaryValueProblem,
     log.info("estimate: %s GB of memory%s", rounded(needed / 1000.0, 1), each)
     if free is None or needed <= free:
         return
-    spans = len(trial_space(as_multipatch(body).patches[0], options.refine, options.degree).breaks[0]) - 1
-    most = processes if isinstance(body, MultiPatch) else spans  # several patches are solved by one process
+    spans = len(trial_space(as_body(body).patches[0], options.refine, options.degree).breaks[0]) - 1
+    most = processes if isinstance(body, Body) else spans  # several patches are solved by one process
     enough = next((count for count in range(processes + 1, most + 1) if wanted.on(count) <= free), None)
     more = f", or take {enough} processes with as much memory each: mpiexec -n {enough} iga-nn solve .. --mpi"
     log.warning(

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from parameterize.checkpoint import Checkpoints
-from parameterize.spline.multipatch import MultiPatch, as_multipatch
+from parameterize.spline.body import Body, BodyLike, as_body
 from solve import SolveReport
 from solve.discretization.errors import Errors
 from solve.field import MultiPatchField, SplineField
@@ -15,7 +15,7 @@ from solve.forms.boundary_value_problem import BoundaryValueProblem
 from solve.reactions import Balance
 from solve.solution import MultiPatchSolution, Solution
 
-from ..figures.evaluate import Body, problems_on
+from ..figures.evaluate import problems_on
 from ..options import ProblemOptions
 from ..report import document as reports
 from .output_folder import digest
@@ -80,7 +80,7 @@ class KeptLevels:
         state |= {"solution": digest(self.folder / SOLUTION)}
         self.checkpoints.save(_CHECKPOINT, {}, state)
 
-    def load(self, body: Body, problem: BoundaryValueProblem) -> Levels:
+    def load(self, body: BodyLike, problem: BoundaryValueProblem) -> Levels:
         """Return the levels that are kept; none where others were asked for, or where the solution is not theirs.
 
         Raises CheckpointError for a checkpoint of another run.
@@ -117,14 +117,14 @@ def _report(values: dict[str, Any]) -> SolveReport:
     return SolveReport(**given)
 
 
-def _loaded(path: Path, body: Body, report: SolveReport, problem: BoundaryValueProblem) -> Found:
+def _loaded(path: Path, body: BodyLike, report: SolveReport, problem: BoundaryValueProblem) -> Found:
     """Return the solution of a file on its body."""
-    fields = MultiPatchField.load(path).patches if isinstance(body, MultiPatch) else (SplineField.load(path),)
-    parts = zip(fields, as_multipatch(body).patches, problems_on(problem, body), strict=True)
+    fields = MultiPatchField.load(path).patches if isinstance(body, Body) else (SplineField.load(path),)
+    parts = zip(fields, as_body(body).patches, problems_on(problem, body), strict=True)
     patches = tuple(
         Solution(one.degrees, one.knots, one.coefficients, patch, report=report, problem=own)
         for one, patch, own in parts
     )
-    if isinstance(body, MultiPatch):
+    if isinstance(body, Body):
         return MultiPatchSolution(patches, body, report, problem.on(body))
     return patches[0]

@@ -17,7 +17,7 @@ from parameterize.checkpoint import differing
 from parameterize.compilation import compilation_told
 from parameterize.files import array_names, load_arrays, save_arrays
 from parameterize.progress import ProgressCallback
-from parameterize.spline.multipatch import MultiPatch
+from parameterize.spline.body import Body, BodyLike, as_body
 from parameterize.spline.volume import FACE_NAMES
 from parameterize.surface.geometry import vertex_normals
 from parameterize.surface.surface import Surface
@@ -27,7 +27,6 @@ from solve.forms.boundary_value_problem import BoundaryValueProblem
 from solve.forms.frame import UnitFrame
 
 from ..errors import InputError, input_errors
-from ..figures.evaluate import Body
 from ..io.formats import load_volume
 from ..models import resolve
 from ..options import MapOptions
@@ -108,7 +107,7 @@ def map_surface(
     that is solved on the map, and its number of unknowns.
     """
 
-    def made(body: Body, history: dict[str, Any]) -> None:
+    def made(body: BodyLike, history: dict[str, Any]) -> None:
         state.begin("map", "solution")  # files that stay until the checkpoint of a resumed run is accepted
         state.write(**known)  # first, so that files which a full disk or a kill leaves belong to a run
         _draw(state, given, body, history)
@@ -124,7 +123,7 @@ def map_surface(
 
 def kept_map(
     state: RunFolder, given: MapInput, known: dict[str, Any], problem: BoundaryValueProblem | None
-) -> Body | None:
+) -> BodyLike | None:
     """Return the certified map that an interrupted run of the same options has left; None where there is none.
 
     Its report is taken over, and its figures are drawn, because the interruption may have come before them. The
@@ -325,7 +324,7 @@ def _write(
         seed=mapping.seed,
         device=result.device,
         versions=reports.versions(),
-        parameterization=with_unproved(result.quality.as_dict(), result.volume, result.certificate)
+        parameterization=with_unproved(result.quality.as_dict(), as_body(result.volume), result.certificate)
         | {"origin": result.origin, "division": result.division}
         | {"attempts": [asdict(attempt) for attempt in result.attempts]}
         | ({"refinement": asdict(result.refinement)} if result.refinement else {}),
@@ -333,9 +332,9 @@ def _write(
     tell(state, mapping)
 
 
-def _draw(state: RunFolder, given: MapInput, body: Body, history: dict[str, Any]) -> None:
+def _draw(state: RunFolder, given: MapInput, body: BodyLike, history: dict[str, Any]) -> None:
     """Draw the map, its blocks, and the course of the training: beside the run they are done before the solve is."""
-    known: dict[str, Any] = {"blocks": body} if isinstance(body, MultiPatch) else {}
+    known: dict[str, Any] = {"blocks": body} if isinstance(body, Body) else {}
     if len(next(iter(history.values()))):  # exact blocks have no steps
         known["history"] = history
     state.draw("map", volume=body, marks=given.marks, **known)
@@ -343,7 +342,7 @@ def _draw(state: RunFolder, given: MapInput, body: Body, history: dict[str, Any]
 
 def _draw_defects(state: RunFolder, result: Parameterization) -> None:
     """Draw the places without a proof and the places where the map meets itself, if there are any."""
-    if len(places := unproved_places(result.volume, result.certificate)):
+    if len(places := unproved_places(as_body(result.volume), result.certificate)):
         state.draw("map", faulty=result.volume, places=places)
     if meeting := result.quality.boundary_check.meeting:
         state.draw("map", faulty=result.volume, meeting=meeting)

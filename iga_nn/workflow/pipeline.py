@@ -17,7 +17,7 @@ import numpy as np
 from parameterize.checkpoint import Checkpoints, differing
 from parameterize.files import save_text
 from parameterize.progress import ProgressCallback
-from parameterize.spline.multipatch import as_multipatch
+from parameterize.spline.body import BodyLike, as_body
 from parameterize.spline.volume import BSplineVolume
 from parameterize.threads import default_threads
 from solve import ConvergenceRow, check_device, check_problem, convergence, modes
@@ -26,7 +26,6 @@ from solve.forms.boundary_value_problem import BoundaryValueProblem
 from solve.study import with_rates
 
 from ..errors import InputError, input_errors
-from ..figures.evaluate import Body
 from ..io.formats import load_volume
 from ..level_table import Study, as_csv, as_table, rows_of
 from ..options import (
@@ -290,7 +289,7 @@ def study_to(
     study_options, path = study_options or StudyOptions(), Path(volume)
     problem, levels = study_options.problem(), study_options.levels()
     loaded = load_volume(path)
-    degrees = sorted(study_options.degree) or [max(max(patch.degrees) for patch in as_multipatch(loaded))]
+    degrees = sorted(study_options.degree) or [max(max(patch.degrees) for patch in as_body(loaded))]
     for degree in degrees:
         check_size(loaded, levels[-1], degree, problem.form.components)
     with input_errors():
@@ -395,7 +394,7 @@ def _finished_by(
 
 def _finish(
     state: RunFolder,
-    body: Body,
+    body: BodyLike,
     solution: Found | None = None,
     problem: BoundaryValueProblem | None = None,
     units: Units = NO_UNITS,

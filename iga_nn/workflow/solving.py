@@ -10,13 +10,14 @@ from typing import Any
 
 import numpy as np
 
+from parameterize.spline.body import BodyLike
 from solve import ConvergenceError, ConvergenceRow, Modes, SolveOptions, SolveReport, rates, solve_with
 from solve.forms.boundary_value_problem import BoundaryValueProblem
 from solve.forms.condition import WITH_FACTOR, Condition
 from solve.forms.frame import UnitFrame
 
 from ..errors import InputError, input_errors, one_line
-from ..figures.evaluate import Body, fields_on
+from ..figures.evaluate import fields_on
 from ..options import NO_UNITS, ProblemOptions, Units
 from ..report import document as reports
 from ..report import html
@@ -31,7 +32,7 @@ NOT_SHOWN = ("refine", "degree", "solve_anyway")  # options of a problem that it
 
 def solve_levels(
     state: RunFolder,
-    body: Body,
+    body: BodyLike,
     problem: BoundaryValueProblem,
     statement: ProblemOptions,
     options: SolveOptions,
@@ -69,7 +70,9 @@ def solve_levels(
     return done.finest
 
 
-def section_of(statement: ProblemOptions, problem: BoundaryValueProblem, body: Body, done: Levels) -> dict[str, Any]:
+def section_of(
+    statement: ProblemOptions, problem: BoundaryValueProblem, body: BodyLike, done: Levels
+) -> dict[str, Any]:
     """Return the section of report.json on a problem and the levels that are done."""
     asked = {name: given for name, given in asdict(statement).items() if name not in NOT_SHOWN}
     known = asked | described(problem, body)
@@ -87,7 +90,7 @@ def _growth(statement: ProblemOptions, problem: BoundaryValueProblem, done: Leve
 
 
 def _show(
-    state: RunFolder, body: Body, done: Levels, problem: BoundaryValueProblem, statement: ProblemOptions
+    state: RunFolder, body: BodyLike, done: Levels, problem: BoundaryValueProblem, statement: ProblemOptions
 ) -> tuple[Found, BoundaryValueProblem, Units]:
     """Draw the finest solution, write it for ParaView, and return what its view takes."""
     assert done.finest is not None
@@ -111,7 +114,7 @@ def level_of(solution: Found) -> dict[str, Any]:
 
 
 def each_level(
-    body: Body, problem: BoundaryValueProblem, levels: Sequence[int], options: SolveOptions
+    body: BodyLike, problem: BoundaryValueProblem, levels: Sequence[int], options: SolveOptions
 ) -> Iterator[Found]:
     """Solve level after level and yield the solutions; the solve of a scalar problem starts at the last solution.
 
@@ -133,7 +136,7 @@ def each_level(
 @contextmanager
 def reported(
     state: RunFolder,
-    body: Body,
+    body: BodyLike,
     missing: Callable[[], str] = str,
     show: Callable[[], tuple[Any, ...]] = tuple,
 ) -> Iterator[None]:
@@ -178,7 +181,7 @@ def is_finite(solution: Found) -> bool:
     return all(bool(np.all(np.isfinite(field.coefficients))) for field in fields_on(solution))
 
 
-def _draw(state: RunFolder, body: Body, done: Levels, problem: BoundaryValueProblem, units: Units) -> None:
+def _draw(state: RunFolder, body: BodyLike, done: Levels, problem: BoundaryValueProblem, units: Units) -> None:
     """Draw the finest solution, its error where the exact solution is known, and the convergence of several levels.
 
     A solution with coefficients that are not finite, after a failure of the solver, is not drawn.
@@ -230,7 +233,7 @@ def _joined(data: Any, free: Sequence[bool] = ()) -> str:
     return f"{data:.12g}" if isinstance(data, float) else str(data)
 
 
-def described(problem: BoundaryValueProblem, body: Body) -> dict[str, Any]:
+def described(problem: BoundaryValueProblem, body: BodyLike) -> dict[str, Any]:
     """Return the entries of a problem in the report beside its options: the exact solution and the frame of X, Y, Z."""
     given: dict[str, Any] = {"exact": problem.exact} if isinstance(problem.exact, str) else {}
     return given | ({"frame": UnitFrame.of(body).as_dict()} if problem.is_scaled else {})
@@ -243,7 +246,7 @@ def notices_of(found: Iterable[SolveReport]) -> list[str]:
 
 def scene_of(
     state: RunFolder,
-    body: Body,
+    body: BodyLike,
     solution: Found | None = None,
     problem: BoundaryValueProblem | None = None,
     units: Units = NO_UNITS,
@@ -256,7 +259,7 @@ def scene_of(
     return None
 
 
-def moving_scene_of(state: RunFolder, body: Body, found: Modes) -> Any:
+def moving_scene_of(state: RunFolder, body: BodyLike, found: Modes) -> Any:
     """Return the view in which a body swings in its modes; None where it cannot be drawn."""
     with state.timed("report"), state.drawing("interactive view"):
         from ..report import viewer

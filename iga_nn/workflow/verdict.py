@@ -8,9 +8,8 @@ from parameterize.arrays import in_brackets
 from parameterize.certificate.body import certify
 from parameterize.certificate.boundary import check_boundary
 from parameterize.compilation import compilation_told
-from parameterize.quality.proved import proved, proved_of
-from parameterize.spline.multipatch import MultiPatch
-from parameterize.spline.volume import BSplineVolume
+from parameterize.quality.proved import proved
+from parameterize.spline.body import Body, BodyLike, as_body
 
 from ..options import MapOptions
 from ..report import advice
@@ -21,18 +20,15 @@ from .output_folder import RunFolder, digest
 log = logging.getLogger(__name__)
 
 
-def certified_facts(body: BSplineVolume | MultiPatch) -> dict[str, Any]:
+def certified_facts(body: Body) -> dict[str, Any]:
     """Certify a body and return the section `parameterization` of report.json."""
     with compilation_told():
-        if isinstance(body, MultiPatch):
-            whole = certify(body)
-            return with_unproved(proved_of(body, whole, check_boundary(body)), body, whole)
         certificate = certify(body)
-        facts = proved(body.shape, body.degrees, certificate, check_boundary(body))
+        facts = proved(body, certificate, check_boundary(body))
     return with_unproved(facts, body, certificate)
 
 
-def write_certificate(state: RunFolder, path: Path, body: BSplineVolume | MultiPatch, command: str) -> None:
+def write_certificate(state: RunFolder, path: Path, body: BodyLike, command: str) -> None:
     """Certify a saved body, and write the sections of report.json about the input and the proof."""
     with state.timed("certify"):
         facts = facts_of_file(path, body)
@@ -45,9 +41,9 @@ def write_certificate(state: RunFolder, path: Path, body: BSplineVolume | MultiP
     tell(state)
 
 
-def facts_of_file(path: Path, body: BSplineVolume | MultiPatch) -> dict[str, Any]:
+def facts_of_file(path: Path, body: BodyLike) -> dict[str, Any]:
     """Certify a saved body; return the section `parameterization`, with how far it is from the surface of its run."""
-    facts = certified_facts(body)
+    facts = certified_facts(as_body(body))
     return facts | _measured_beside(path, facts)
 
 

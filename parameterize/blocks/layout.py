@@ -10,8 +10,8 @@ import numpy as np
 from ..arrays import Array, IntArray, Mask, in_brackets
 from ..certificate.boundary import check_boundary
 from ..skeleton.graph import Skeleton
+from ..spline.body import Body as SplineBody
 from ..spline.interface import Face, Interface, face_label, orientations, varying
-from ..spline.multipatch import MultiPatch
 from ..spline.volume import FACE_NAMES
 from .block import Block
 from .centering import centered
@@ -147,7 +147,7 @@ def _laid(
         if faults:
             continue
         layout, drafted = _layout(draft, spans)
-        met = check_boundary(MultiPatch(tuple(block.spline for block in layout.blocks), layout.interfaces)).meeting
+        met = check_boundary(SplineBody(tuple(block.spline for block in layout.blocks), layout.interfaces)).meeting
         if met is None:
             return layout
         draft.thin_near(np.array(met.point), tuple(drafted[number] for number in met.patches or ()))

@@ -15,9 +15,9 @@ import numpy as np
 
 from ..arrays import Array, IntArray, in_brackets
 from ..cube.cube import VARYING_AXES
+from ..spline.body import Body, BodyLike, as_body
 from ..spline.bspline import breakpoints
 from ..spline.interface import axis_side
-from ..spline.multipatch import MultiPatch, as_multipatch
 from ..spline.volume import BSplineVolume
 from .patch_proofs import Pieces, as_rows, boundary_pieces, contact, halved, is_proved
 from .shells import overlap
@@ -72,7 +72,7 @@ class BoundaryCheck:
         return {"boundary_injective": self.injective, "boundary_meeting": place}
 
 
-def check_boundary(body: BSplineVolume | MultiPatch, *, max_depth: int = 24) -> BoundaryCheck:
+def check_boundary(body: BodyLike, *, max_depth: int = 24) -> BoundaryCheck:
     """Decide whether the map is injective on the outer boundary, where points that interfaces make one are one.
 
     A volume is a body of one patch. Pieces are cut at most `max_depth` times in four. Of several shells, the outer
@@ -81,7 +81,7 @@ def check_boundary(body: BSplineVolume | MultiPatch, *, max_depth: int = 24) -> 
     """
     if max_depth < 0:
         raise ValueError(f"max_depth must be non-negative, got {max_depth}")
-    body = as_multipatch(body)
+    body = as_body(body)
     local = _local(body)
     pieces = boundary_pieces(local)
     error = _rounding(local, max_depth)
@@ -104,7 +104,7 @@ def check_boundary(body: BSplineVolume | MultiPatch, *, max_depth: int = 24) -> 
     return BoundaryCheck(None, None, len(pairs))
 
 
-def _local(body: MultiPatch) -> MultiPatch:
+def _local(body: Body) -> Body:
     """Return the body with its middle moved to the origin, and scaled by a power of two to magnitude 1.
 
     Each coordinate is rounded once, relative to its difference from the middle, however far away the middle is.
@@ -116,10 +116,10 @@ def _local(body: MultiPatch) -> MultiPatch:
     patches = (
         replace(patch, control_points=np.ldexp(points, -exponent)) for patch, points in zip(body, moved, strict=True)
     )
-    return MultiPatch(tuple(patches), body.interfaces)
+    return Body(tuple(patches), body.interfaces)
 
 
-def _rounding(local: MultiPatch, max_depth: int) -> float:
+def _rounding(local: Body, max_depth: int) -> float:
     """Return a bound of the rounding error of a Bezier control point's coordinate.
 
     No weight is negative and all sum to 1, so that each rounding changes a sum by at most the unit roundoff times the
@@ -138,16 +138,14 @@ def _rounding(local: MultiPatch, max_depth: int) -> float:
     return 1.01 * roundings * 2.0**-53 * max(float(np.abs(patch.control_points).max()) for patch in local)
 
 
-def _meeting(body: MultiPatch, patches: IntArray, where: tuple[Array, Array]) -> Meeting:
+def _meeting(body: Body, patches: IntArray, where: tuple[Array, Array]) -> Meeting:
     """Return the meeting of two parameters, (3,) each, of patches (2,)."""
     p, q = (tuple(row.tolist()) for row in where)
     point = tuple(body.patches[patches[0]](where[0])[0].tolist())
     return Meeting((p, q), point, (int(patches[0]), int(patches[1])) if len(body) > 1 else None)
 
 
-def _search(
-    local: MultiPatch, pieces: Pieces, pairs: IntArray, error: float
-) -> tuple[IntArray, tuple[Array, Array]] | None:
+def _search(local: Body, pieces: Pieces, pairs: IntArray, error: float) -> tuple[IntArray, tuple[Array, Array]] | None:
     """Return two parameters of a common point of pieces that do not touch, and the numbers (2,) of their patches.
 
     Newton's method starts from the middle of some pairs. Beside an edge of the cube it tends to two equal parameters:
@@ -180,7 +178,7 @@ def _search(
     return np.array([patches[0][best], patches[1][best]]), (where[0][best], where[1][best])
 
 
-def _slopes(body: MultiPatch, patches: list[IntArray], where: list[Array], tangents: list[IntArray]) -> Array:
+def _slopes(body: Body, patches: list[IntArray], where: list[Array], tangents: list[IntArray]) -> Array:
     """Return the derivative (k, 3, 4) of F(p) - F(q) in the two free parameters of each."""
     of_p, of_q = (
         np.take_along_axis(_by_patch(body, patches[k], where[k], BSplineVolume.jacobian), tangents[k][:, None], axis=2)
@@ -189,7 +187,7 @@ def _slopes(body: MultiPatch, patches: list[IntArray], where: list[Array], tange
     return np.concatenate([of_p, -of_q], axis=2)
 
 
-def _distance(body: MultiPatch, patches: list[IntArray], where: list[Array]) -> Array:
+def _distance(body: Body, patches: list[IntArray], where: list[Array]) -> Array:
     """Return a lower bound (k,) of the distance of two parameters, in one patch or through glued faces; at most 1."""
     direct = np.where(patches[0] == patches[1], np.abs(where[0] - where[1]).max(axis=1), 1.0)
     glued = np.ones((len(body), 2, 3), dtype=bool)  # faces where a parameter is 0, then those where it is 1
@@ -203,9 +201,7 @@ def _distance(body: MultiPatch, patches: list[IntArray], where: list[Array]) -> 
     return np.minimum(direct, sum(to_glued))
 
 
-def _by_patch(
-    body: MultiPatch, patches: IntArray, where: Array, function: Callable[[BSplineVolume, Array], Array]
-) -> Array:
+def _by_patch(body: Body, patches: IntArray, where: Array, function: Callable[[BSplineVolume, Array], Array]) -> Array:
     """Return the values (k, ...) of a function of a patch and parameters, at parameters (k, 3) of patches (k,)."""
     numbers = np.unique(patches)
     parts = [function(body.patches[number], where[patches == number]) for number in numbers]
@@ -215,12 +211,12 @@ def _by_patch(
     return values
 
 
-def _at(body: MultiPatch, patches: IntArray, where: Array) -> Array:
+def _at(body: Body, patches: IntArray, where: Array) -> Array:
     """Return the points (k, 3) at parameters (k, 3) of patches (k,)."""
     return _by_patch(body, patches, where, BSplineVolume.__call__)
 
 
-def _middles(body: MultiPatch, pieces: Pieces, rows: IntArray) -> Array:
+def _middles(body: Body, pieces: Pieces, rows: IntArray) -> Array:
     """Return the parameters (k, 3) of the middle of pieces."""
     middle = (pieces.low[rows] + pieces.high[rows]) / 2.0 ** (pieces.depth + 1)
     return _by_patch(body, pieces.patches[rows], middle, _parameters)

@@ -6,9 +6,9 @@ import numpy as np
 
 from ..arrays import IntArray
 from ..cube.cube import VARYING_AXES
+from ..spline.body import Body, shared_numbers
 from ..spline.bspline import breakpoints
 from ..spline.interface import Face, Interface, axis_side
-from ..spline.multipatch import MultiPatch, shared_numbers
 
 _PLACES = [0, 1, 3]  # of the four lattice points a direction: the lower end, between the ends, the upper end
 
@@ -21,7 +21,7 @@ class SharedPoints:
     inner points, the one with the smaller number is nearer to its beginning, whichever patch it is looked at from.
     """
 
-    def __init__(self, body: MultiPatch) -> None:
+    def __init__(self, body: Body) -> None:
         labels: IntArray = np.stack(shared_numbers([(4, 4, 4)] * len(body), body.interfaces)[0])
         ways = [[[0, 2, 3] if axis == turned else _PLACES for axis in range(3)] for turned in range(3)]
         ahead, *further = (labels[:, rows[0]][:, :, rows[1]][..., rows[2]] for rows in ([_PLACES] * 3, *ways))

@@ -1,4 +1,4 @@
-"""Certificate: a proof that det J of a trivariate spline is positive on the whole cube, or a point where it is not.
+"""PatchCertificate: a proof that det J of a spline is positive on the whole cube, or a point where it is not.
 
 For a left-handed volume, whose det J is negative on the whole, the mirror image is examined: -det J > 0.
 
@@ -14,13 +14,14 @@ from typing import Literal
 import numpy as np
 
 from ..arrays import Array, IntArray, Mask
-from ..display import Shown
 from ..spline.bernstein import split
 from ..spline.orientation import mirrored, orientation
 from ..spline.volume import BSplineVolume
 from .determinant import CHUNK, DeterminantForm, corners_of
 from .rational_determinant import RationalDeterminantForm
 
+Verdict = Literal["certified", "folded", "undecided"]
+Parameters = tuple[float, float, float]  # of a point of the cube
 CLAIMS = {"right-handed": "det J > 0", "left-handed": "det J < 0"}
 
 _PIECES = 64  # pieces at a time
@@ -28,8 +29,8 @@ _TIGHT = 0.5  # a proved bound below this share of the least known value of det 
 
 
 @dataclass(frozen=True)
-class Certificate(Shown):
-    """The sign of det J on the whole cube, as far as it is known.
+class PatchCertificate:
+    """The sign of det J on the whole cube of one patch, as far as it is known.
 
     Attributes
     ----------
@@ -55,17 +56,17 @@ class Certificate(Shown):
     --------
     >>> import iga_nn
     >>> from solve import benchmark_volume
-    >>> iga_nn.certify(benchmark_volume(4, amplitude=0.4)).verdict
+    >>> iga_nn.certify(benchmark_volume(4, amplitude=0.4)).patches[0].verdict
     'folded'
     """
 
-    verdict: Literal["certified", "folded", "undecided"]
+    verdict: Verdict
     lower_bound: float
     mean_det: float
-    witness: tuple[float, float, float] | None
+    witness: Parameters | None
     unproved: IntArray
     left_handed: bool = False
-    flat: tuple[float, float, float] | None = None
+    flat: Parameters | None = None
 
     @property
     def orientation(self) -> str:
@@ -78,7 +79,7 @@ class Certificate(Shown):
         return CLAIMS[self.orientation]
 
 
-def certify_patch(volume: BSplineVolume, max_depth: int) -> Certificate:
+def certify_patch(volume: BSplineVolume, max_depth: int) -> PatchCertificate:
     """Decide whether det J has one sign on the whole cube, cutting doubtful spans at most `max_depth` times in eight.
 
     Raises ValueError where derivatives overflow.
@@ -96,10 +97,10 @@ def certify_patch(volume: BSplineVolume, max_depth: int) -> Certificate:
     lowest = min(float(bounds.min()), search.lowest)
     mean = float(np.sum(means * form.span_sizes()))
     failed = np.flatnonzero(search.unproved)
-    verdict: Literal["certified", "folded", "undecided"] = "undecided" if failed.size else "certified"
+    verdict: Verdict = "undecided" if failed.size else "certified"
     if search.worst_piece is not None:
         verdict = "folded"
-    return Certificate(
+    return PatchCertificate(
         verdict=verdict,
         lower_bound=lowest / abs(mean) if mean != 0.0 else -np.inf,
         mean_det=float(np.ldexp(-mean if left_handed else mean, form.exponent)),
@@ -204,7 +205,7 @@ class _Search:
             self.deepest = float(corners[row, corner])
             self.worst_piece = _corner(pieces, int(row), int(corner))
 
-    def parameters(self, corner: _Corner, inward: float = 0.0) -> tuple[float, float, float]:
+    def parameters(self, corner: _Corner, inward: float = 0.0) -> Parameters:
         """Return the parameters of a corner of a piece, or of a point a share of the way towards its middle."""
         depth, span, origin, place = corner
         number = self.form.numbers(np.array([span]))[0]
@@ -213,7 +214,7 @@ class _Search:
         u, v, w = ((1.0 - local) * edges[:, 0] + local * edges[:, 1]).tolist()
         return u, v, w
 
-    def witness(self, volume: BSplineVolume) -> tuple[float, float, float] | None:
+    def witness(self, volume: BSplineVolume) -> Parameters | None:
         """Return the parameters of the worst fold found.
 
         Derivatives may jump between spans, and parameters are rounded: where det J as evaluated there is positive, a

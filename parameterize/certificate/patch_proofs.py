@@ -20,9 +20,9 @@ import numpy as np
 from ..arrays import Array, IntArray, Mask
 from ..cube.cube import VARYING_AXES
 from ..spline.bernstein import elevation, extraction, halving
+from ..spline.body import Body
 from ..spline.bspline import breakpoints
 from ..spline.interface import axis_side
-from ..spline.multipatch import MultiPatch
 from ..spline.rational import projected
 from ..spline.volume import BSplineVolume
 from .gluing import SharedPoints
@@ -70,7 +70,7 @@ class Pieces:
         return self.shared.names(self.patches, self.axes, positions, 2 ** (self.depth + 1))
 
 
-def boundary_pieces(body: MultiPatch) -> Pieces:
+def boundary_pieces(body: Body) -> Pieces:
     """Return all spans of the faces that are not glued, raised to the largest degree."""
     degree = max(max(patch.degrees) for patch in body)
     is_rational = any(patch.weights is not None for patch in body)

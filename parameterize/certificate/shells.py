@@ -12,8 +12,8 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from ..arrays import Array, IntArray, Mask
+from ..spline.body import Body, shared_numbers
 from ..spline.interface import axis_side, face_layer
-from ..spline.multipatch import MultiPatch, shared_numbers
 from ..spline.orientation import exact_rules, face_flux, orientation
 from ..spline.volume import BSplineVolume
 
@@ -22,7 +22,7 @@ _ROUNDING = 1e-9  # of the sum of their magnitudes: more than the integrals over
 BoundaryFace = tuple[int, int, int]  # the number of a patch, and the constant axis and the side of its face
 
 
-def overlap(body: MultiPatch) -> bool | None:
+def overlap(body: Body) -> bool | None:
     """Return whether the shells of a boundary that does not meet itself enclose a place twice; None where not known.
 
     body: near the origin; its patches have a det J of one sign and lie on opposite sides of their interfaces.
@@ -37,12 +37,12 @@ def overlap(body: MultiPatch) -> bool | None:
     return any(_lies_in_another_part(body, parts, shells[i][0]) for i in np.flatnonzero(outward))
 
 
-def _parts(body: MultiPatch) -> IntArray:
+def _parts(body: Body) -> IntArray:
     """Return for each patch the number of the part that it belongs to: patches joined through interfaces."""
     return _groups(len(body), [(one.first[0], one.second[0]) for one in body.interfaces])
 
 
-def _shells(body: MultiPatch) -> list[list[BoundaryFace]]:
+def _shells(body: Body) -> list[list[BoundaryFace]]:
     """Return the shells, each a list of its faces. Faces with a common edge are in one shell."""
     numbers, count = shared_numbers([(3, 3, 3)] * len(body), body.interfaces)  # a number for the middle of each edge
     faces = [(k, name) for k, names in enumerate(body.outer) for name in names]
@@ -61,7 +61,7 @@ def _groups(count: int, pairs: Sequence[tuple[int, int]]) -> IntArray:
     return np.asarray(connected_components(graph, directed=False)[1], dtype=np.int64)
 
 
-def _outward(body: MultiPatch, shells: Sequence[Sequence[BoundaryFace]], alone: Mask) -> Mask | None:
+def _outward(body: Body, shells: Sequence[Sequence[BoundaryFace]], alone: Mask) -> Mask | None:
     """Return the mask of the shells that face outward; None where rounding hides it.
 
     alone: whether a shell is the only one of its part, which can but face outward.
@@ -78,13 +78,13 @@ def _outward(body: MultiPatch, shells: Sequence[Sequence[BoundaryFace]], alone: 
     return outward
 
 
-def _flux(body: MultiPatch, face: BoundaryFace) -> float:
+def _flux(body: Body, face: BoundaryFace) -> float:
     """Return the part of the volume that a face contributes where its patch is right-handed."""
     k, axis, side = face
     return face_flux(body.patches[k], exact_rules(body.patches[k]), axis, side, np.zeros(3))
 
 
-def _lies_in_another_part(body: MultiPatch, parts: IntArray, face: BoundaryFace) -> bool:
+def _lies_in_another_part(body: Body, parts: IntArray, face: BoundaryFace) -> bool:
     """Return whether a corner of a face is a point of another part."""
     k, axis, side = face
     corner = body.patches[k].face(axis, side)[0, 0]

@@ -73,7 +73,7 @@ def face_points(nets: Nets) -> tuple[Array, IntArray]:
 
 def _anchor_points(nets: Nets) -> tuple[Array, IntArray]:
     """Return the points of the anchors (k, 3), and their faces (k,)."""
-    if nets.one_cube:
+    if nets.is_single:
         return edge_points(nets)
     points, faces = zip(edge_points(nets), face_points(nets), strict=True)
     return np.concatenate(points), np.concatenate(faces)
@@ -85,7 +85,7 @@ class Anchors:
     def __init__(self, surface: SurfaceFit) -> None:
         self._surface = surface
         nets = surface.places.nets
-        self._share = _EDGES if nets.one_cube else _FACES
+        self._share = _EDGES if nets.is_single else _FACES
         points, faces = _anchor_points(nets)
         places = SlidingParameters(nets, points, faces)
         self.fit = SurfaceFit(places, points, np.zeros((len(points), 3, 3)), np.full(len(points), 1.0 / len(points)))

@@ -112,7 +112,7 @@ def contact_penalty(spline: SplineMap, gap: float = _GAP, near: IntArray | None 
 
 def _sampled(spline: SplineMap) -> SampledBoundary:
     """Return samples of the boundary: as many on each face of one cube, a few in each span of several blocks."""
-    if spline.nets.one_cube:
+    if spline.nets.is_single:
         return SampledBoundary.on(spline.volume, *[np.linspace(0.0, 1.0, _SAMPLES)] * 3)
     return SampledBoundary.of(spline.body, samples=2)
 

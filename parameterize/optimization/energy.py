@@ -102,14 +102,14 @@ class SplineEnergy:
         by_faces: whether the faces of F are drawn to the surface in this round, in place of the surface's data.
         """
         self._round = RoundWeights(penalty, self._weights.surface * (1.0 if share is None else share))
-        if not self.nets.one_cube:
+        if not self.nets.is_single:
             self._measure_in(own_boxes(SplineMap(self.nets, control).body), self.determinants.weights)
             reassign(self.surface, control, first=by_faces)
             self._approach = faces_towards(self.surface, control) if by_faces else None
         self.distortion.start_round(control, penalty)
         if self._weights.least_floor < 1.0:
             self.determinants.lower_floors(self.distortion.lower_floors(control, self._weights.least_floor))
-        if not self.nets.one_cube or (share is None and not self._grows):
+        if not self.nets.is_single or (share is None and not self._grows):
             return
         self._grows = share is not None
         self._precondition = self._preconditioner()

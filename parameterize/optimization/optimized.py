@@ -4,9 +4,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from ..arrays import IntArray
-from ..certificate.body import BodyCertificate, certify
+from ..certificate.body import Certificate, certify
 from ..certificate.boundary import check_boundary
-from ..certificate.jacobian import Certificate
 from ..spline.spline_map import SplineMap
 from .spans import in_blocks
 
@@ -20,7 +19,7 @@ class Optimized:
     """
 
     spline: SplineMap
-    certificate: Certificate | BodyCertificate
+    certificate: Certificate
     injective: bool | None
 
     @classmethod
@@ -34,8 +33,7 @@ class Optimized:
     @cached_property
     def unproved(self) -> IntArray:
         """Return the spans (k, 4) of all blocks on which det J > 0 is not proved."""
-        found = self.certificate
-        return in_blocks([part.unproved for part in ((found,) if isinstance(found, Certificate) else found.patches)])
+        return in_blocks([patch.unproved for patch in self.certificate.patches])
 
     @property
     def meets_itself(self) -> bool:

@@ -60,7 +60,7 @@ class Phase(ABC):
 
     def begin(self, state: State) -> None:
         """Set the weights of the data and of the anchors for the next round: those of several blocks always act."""
-        if state.energy.nets.one_cube:
+        if state.energy.nets.is_single:
             state.energy.anchors.release()
         else:
             state.energy.anchors.aim(state.spline.control)
@@ -146,7 +146,7 @@ class Separate(Phase):
         energy, control = state.energy, state.spline.control
         energy.give_way(energy.watch_contact(control), _CONTACT_WAY)
         super().begin(state)
-        if not energy.nets.one_cube and not state.rounds[self.name]:
+        if not energy.nets.is_single and not state.rounds[self.name]:
             reassign(energy.surface, control, first=True)
 
     def done(self, state: State) -> Reason | None:

@@ -155,7 +155,7 @@ class SlidingParameters:
         other = copy(self)
         for _ in range(slides):
             other.slide(control, points)
-        if not self.nets.one_cube:
+        if not self.nets.is_single:
             return other
         other.unflip()
         other._move(untangle_whole(other.parameters, self.triangles, sweeps, other.still))
@@ -165,7 +165,7 @@ class SlidingParameters:
 
     def relax(self, sweeps: int) -> None:
         """Untangle flipped triangles in a few sweeps, so that flips of several slides do not accumulate."""
-        if not self.nets.one_cube:
+        if not self.nets.is_single:
             return
         self._move(untangle(self.parameters, self.triangles, sweeps, self.still))
 

@@ -9,7 +9,7 @@ from itertools import product
 import numpy as np
 
 from ..arrays import IntArray, Mask
-from ..spline.multipatch import shared_numbers
+from ..spline.body import shared_numbers
 from ..spline.nets import Nets
 
 

@@ -9,9 +9,9 @@ from ..arrays import Array, IntArray
 from ..blocks.layout import Block, BlockLayout
 from ..certificate.body import certify
 from ..certificate.boundary import check_boundary
+from ..spline.body import Body
 from ..spline.bspline import open_uniform_knots
 from ..spline.directions import tied_spans
-from ..spline.multipatch import MultiPatch
 from ..spline.nets import Nets
 from ..spline.volume import FACE_NAMES
 from ..surface.geometry import normals_and_areas, signed_volume
@@ -147,5 +147,5 @@ def _volume(block: Block) -> float:
 def _is_proved(layout: BlockLayout) -> bool:
     """Return whether blocks are certified and their boundary is proved not to meet itself."""
     splines = tuple(block.spline for block in layout.blocks)
-    body = splines[0] if len(splines) == 1 else MultiPatch(splines, layout.interfaces)
+    body = Body(splines, layout.interfaces)
     return certify(body).verdict == "certified" and check_boundary(body).injective is True

@@ -6,7 +6,7 @@ import numpy as np
 
 from ..arrays import Array, IntArray
 from ..cube.cube import axis_and_side, damped_fit, tangent_axes
-from ..spline.multipatch import MultiPatch, as_multipatch
+from ..spline.body import BodyLike, as_body
 from ..spline.sampled_boundary import SampledBoundary
 from ..spline.volume import BSplineVolume
 from ..surface.nearest import closest_triangles
@@ -40,9 +40,7 @@ class Distances:
         return Distances(scale * self.rms, scale * self.mean, scale * self.max)
 
 
-def nearest_on_boundary(
-    points: Array, body: BSplineVolume | MultiPatch, boundary: SampledBoundary
-) -> tuple[IntArray, Array, Array]:
+def nearest_on_boundary(points: Array, body: BodyLike, boundary: SampledBoundary) -> tuple[IntArray, Array, Array]:
     """Return the points of a body's outer boundary that are nearest to points (m, 3): patches, parameters, distances.
 
     patches (m,), all 0 for a volume; parameters (m, 3), on an outer face of that patch; distances (m,).
@@ -60,7 +58,7 @@ def nearest_on_boundary(
     every = np.arange(len(points))
     where[every, axis] = boundary.parameters[corners[:, 0], axis]
     patches, distances = boundary.patches[corners[:, 0]], np.empty(len(points))
-    for number, patch in enumerate(as_multipatch(body)):
+    for number, patch in enumerate(as_body(body)):
         own = np.flatnonzero(patches == number)
         if not own.size:
             continue

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays import Array
+from ..spline.body import BodyLike, as_body
 from ..spline.bspline import gauss_points
-from ..spline.multipatch import MultiPatch, as_multipatch
 from ..spline.orientation import mirrored, orientation
 from ..spline.volume import BSplineVolume
 from .rotations import closest_rotations
@@ -104,9 +104,9 @@ def own_box(volume: BSplineVolume) -> Array:
     return _mean_lengths(volume, rules, np.einsum("i,j,k->ijk", *(weights.ravel() for _, weights in rules)))
 
 
-def own_boxes(body: BSplineVolume | MultiPatch) -> Array:
+def own_boxes(body: BodyLike) -> Array:
     """Return the sides (patches, 3) of the own box of each patch."""
-    return np.array([own_box(patch) for patch in as_multipatch(body)])
+    return np.array([own_box(patch) for patch in as_body(body)])
 
 
 def _mean_lengths(volume: BSplineVolume, rules: Rules, weights: Array) -> Array:

@@ -9,19 +9,18 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays import Array, IntArray, in_brackets, in_percent
-from ..certificate.body import BodyCertificate
+from ..certificate.body import Certificate
 from ..certificate.boundary import BoundaryCheck
-from ..certificate.jacobian import Certificate
 from ..cube.boundary_map import BoundaryMap, on_faces
 from ..display import Shown
-from ..spline.multipatch import MultiPatch, as_multipatch
+from ..spline.body import Body, BodyLike, as_body
 from ..spline.orientation import enclosed_volume
-from ..spline.volume import FACE_NAMES, BSplineVolume
+from ..spline.volume import FACE_NAMES
 from ..surface.features import SHARP
 from ..surface.geometry import signed_volume
 from .distances import Distances
 from .distortion import BoxDistortion, Distortion, arap_grid, in_own_box
-from .proved import proved, proved_of
+from .proved import proved
 from .sharpness import Sharpness, sharpness_of
 from .two_sided import two_sided
 
@@ -70,8 +69,8 @@ class QualityReport(Shown):
         Of a volume by direction; of several patches their number, shared ones once.
     degrees : tuple of int
         Of a volume by direction; of several patches those that occur.
-    certificate : Certificate or BodyCertificate
-        Whether det J > 0 on the whole cube, its lower bound, the witness of a fold; or the same of each patch.
+    certificate : Certificate
+        Whether det J > 0 on the whole cube of each patch, its lower bound, the witness of a fold.
     boundary_check : BoundaryCheck
         Whether the outer faces meet only at their common edges, and a point where they meet elsewhere.
     arap : BothScales of Distortion
@@ -111,7 +110,7 @@ class QualityReport(Shown):
 
     control_points: tuple[int, int, int] | int
     degrees: tuple[int, ...]
-    certificate: Certificate | BodyCertificate
+    certificate: Certificate
     arap: BothScales[Distortion]
     arap_points: int
     boundary: BothScales[Distances]
@@ -207,7 +206,7 @@ class QualityReport(Shown):
     def _verdict(self) -> str:
         found = self.certificate
         verdict = f"{found.verdict}, det J >= {found.lower_bound:.3g} of its mean"
-        if isinstance(found, BodyCertificate):
+        if self.patches:
             verdict = str(found)
         elif found.witness is not None:
             verdict = f"folded at {in_brackets(found.witness)}"
@@ -231,12 +230,12 @@ def _line(name: str, measure: BothScales[Any]) -> str:
 
 
 def measure(
-    body: BSplineVolume | MultiPatch,
+    body: BodyLike,
     surface_vertices: ArrayLike,
     surface_faces: ArrayLike,
     scale: float,
     boundary: BoundaryMap,
-    certificate: Certificate | BodyCertificate,
+    certificate: Certificate,
     boundary_check: BoundaryCheck,
     sharp: float = SHARP,
 ) -> QualityReport:
@@ -254,7 +253,9 @@ def measure(
         raise ValueError(f"scale must be positive, got {scale}; pass Surface.scale")
     vertices = np.asarray(surface_vertices, dtype=np.float64)
     faces = np.asarray(surface_faces, dtype=np.int64)
-    n = len(vertices)
+    n, body = len(vertices), as_body(body)
+    if len(certificate.patches) != len(body):
+        raise TypeError("certificate is not that of this body: pass certify(body)")
     if len(boundary.vertices) < n:
         raise ValueError(f"boundary must start with the surface's {n} vertices, it has {len(boundary.vertices)}")
     gaps = np.linalg.norm(_placed(body, boundary, n) - boundary.vertices[:n], axis=1)
@@ -271,28 +272,26 @@ def measure(
         "spline_samples": len(found.spline_to_mesh.distances),
         "sharpness": sharpness_of(body, vertices, faces, sharp),
     }
-    if isinstance(body, MultiPatch) and isinstance(certificate, BodyCertificate):
+    if not body.is_single:
         return _of_patches(body, certificate, boundary_check, measured)
-    if isinstance(body, MultiPatch) or isinstance(certificate, BodyCertificate):
-        raise TypeError("certificate is not that of this body: pass certify(body)")
-    _, (unit_volume, as_given), weights = arap_grid(body, scales=(scale, 1.0))
+    _, (unit_volume, as_given), weights = arap_grid(body.only, scales=(scale, 1.0))
     return QualityReport(
-        control_points=body.shape,
-        degrees=body.degrees,
+        control_points=body.only.shape,
+        degrees=body.only.degrees,
         certificate=certificate,
         arap=BothScales(_distortion(unit_volume, weights), _distortion(as_given, weights)),
         arap_points=weights.size,
         boundary_check=boundary_check,
-        proof=proved(body.shape, body.degrees, certificate, boundary_check),
+        proof=proved(body, certificate, boundary_check),
         **measured,
     )
 
 
 def _of_patches(
-    body: MultiPatch, certificate: BodyCertificate, boundary_check: BoundaryCheck, measured: dict[str, Any]
+    body: Body, certificate: Certificate, boundary_check: BoundaryCheck, measured: dict[str, Any]
 ) -> QualityReport:
     """Return the report on several patches, each measured against its own box."""
-    patches, proof = tuple(map(in_own_box, body)), proved_of(body, certificate, boundary_check)
+    patches, proof = tuple(map(in_own_box, body)), proved(body, certificate, boundary_check)
     mean = np.average([one.arap.mean for one in patches], weights=[abs(one.volume) for one in patches])
     whole = Distortion(float(mean), max(one.arap.max for one in patches))
     return QualityReport(
@@ -308,14 +307,14 @@ def _of_patches(
     )
 
 
-def _placed(body: BSplineVolume | MultiPatch, boundary: BoundaryMap, count: int) -> Array:
+def _placed(body: Body, boundary: BoundaryMap, count: int) -> Array:
     """Return the points (count, 3) of a body at the places of the first vertices of a boundary map.
 
     Raises ValueError where a vertex lies on a patch that does not exist, or on no outer face of its patch.
     """
     patches, parameters = boundary.patches[:count], boundary.parameters[:count]
-    if not isinstance(body, MultiPatch):
-        return body(parameters)
+    if body.is_single:
+        return body.only(parameters)
     points = body.points(patches, parameters)
     outer = np.array([[name in names for name in FACE_NAMES] for names in body.outer])
     lost = np.flatnonzero(~np.any(on_faces(parameters) & outer[patches], axis=1))
@@ -328,9 +327,9 @@ def _placed(body: BSplineVolume | MultiPatch, boundary: BoundaryMap, count: int)
     return points
 
 
-def _volumes(body: BSplineVolume | MultiPatch, vertices: Array, faces: IntArray) -> Volumes:
+def _volumes(body: Body, vertices: Array, faces: IntArray) -> Volumes:
     middle = vertices.mean(axis=0)
-    enclosed = (abs(enclosed_volume(patch, middle)) for patch in as_multipatch(body))
+    enclosed = (abs(enclosed_volume(patch, middle)) for patch in body)
     return Volumes(sum(enclosed), abs(signed_volume(vertices - middle, faces)))
 
 

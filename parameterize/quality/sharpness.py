@@ -11,8 +11,8 @@ import igl
 import numpy as np
 
 from ..arrays import Array, IntArray
+from ..spline.body import BodyLike, as_body
 from ..spline.bspline import divided_spans
-from ..spline.multipatch import MultiPatch, as_multipatch
 from ..spline.sampled_boundary import SampledBoundary
 from ..spline.volume import FACE_NAMES, BSplineVolume
 from ..surface.features import SHARP, Features, features_of
@@ -54,7 +54,7 @@ class Sharpness:
         return asdict(self)
 
 
-def sharpness_of(body: BSplineVolume | MultiPatch, vertices: Array, faces: IntArray, angle: float = SHARP) -> Sharpness:
+def sharpness_of(body: BodyLike, vertices: Array, faces: IntArray, angle: float = SHARP) -> Sharpness:
     """Measure a body against a closed surface, vertices (n, 3) and faces (m, 3), in one unit of length.
 
     angle: in degrees, above which an edge of the surface is sharp.
@@ -82,7 +82,7 @@ def _samples(found: Features, vertices: Array) -> tuple[Array, Array]:
     return first[edge] + share[:, None] * (last - first)[edge], weights / weights.sum()
 
 
-def distance_to_edges(points: Array, body: BSplineVolume | MultiPatch) -> Array:
+def distance_to_edges(points: Array, body: BodyLike) -> Array:
     """Return the distances (k,) of points (k, 3) from the nearest edge of an outer face of a body."""
     pieces = np.concatenate([curve for patch, names in _outer(body) for curve in _edges(patch, names)])
     ends = np.ascontiguousarray(pieces.reshape(-1, 3))
@@ -90,9 +90,9 @@ def distance_to_edges(points: Array, body: BSplineVolume | MultiPatch) -> Array:
     return np.sqrt(np.asarray(squared).ravel())
 
 
-def _outer(body: BSplineVolume | MultiPatch) -> list[tuple[BSplineVolume, tuple[str, ...]]]:
+def _outer(body: BodyLike) -> list[tuple[BSplineVolume, tuple[str, ...]]]:
     """Return the patches of a body with the names of their outer faces."""
-    several = as_multipatch(body)
+    several = as_body(body)
     return list(zip(several.patches, several.outer, strict=True))
 
 
@@ -113,7 +113,7 @@ def _edges(patch: BSplineVolume, names: tuple[str, ...]) -> list[Array]:
     return found
 
 
-def _angles(body: BSplineVolume | MultiPatch, vertices: Array, faces: IntArray) -> tuple[Array, Array]:
+def _angles(body: BodyLike, vertices: Array, faces: IntArray) -> tuple[Array, Array]:
     """Return angles (k,) in degrees between normals of a body's boundary and those of a surface, and shares of area."""
     boundary = SampledBoundary.of(body, _NORMALS)
     normals, areas = normals_and_areas(boundary.points, boundary.triangles)

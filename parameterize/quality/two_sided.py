@@ -10,11 +10,10 @@ import numpy as np
 
 from ..arrays import Array, IntArray
 from ..cube.cutting import subdivide_finely
+from ..spline.body import BodyLike, as_body
 from ..spline.bspline import breakpoints
 from ..spline.interface import varying
-from ..spline.multipatch import MultiPatch, as_multipatch
 from ..spline.sampled_boundary import SampledBoundary
-from ..spline.volume import BSplineVolume
 from ..surface.geometry import area_shares, normals_and_areas
 from ..surface.nearest import distance_to_mesh
 from .distances import Distances, nearest_on_boundary
@@ -56,7 +55,7 @@ class TwoSided:
         return Distances(float(rms), (one.mean + other.mean) / 2.0, max(one.max, other.max))
 
 
-def two_sided(body: BSplineVolume | MultiPatch, vertices: Array, faces: IntArray) -> TwoSided:
+def two_sided(body: BodyLike, vertices: Array, faces: IntArray) -> TwoSided:
     """Measure the distances between a closed mesh (vertices (n, 3), faces (m, 3)) and the outer boundary of a body.
 
     They have the unit of length of both. The largest one is that at the samples, so it may fall short of the Hausdorff
@@ -76,16 +75,16 @@ def two_sided(body: BSplineVolume | MultiPatch, vertices: Array, faces: IntArray
     )
 
 
-def _spacing(body: BSplineVolume | MultiPatch, vertices: Array, faces: IntArray) -> float:
+def _spacing(body: BodyLike, vertices: Array, faces: IntArray) -> float:
     """Return the length above which edges between samples on the mesh are cut."""
     area = float(normals_and_areas(vertices, faces)[1].sum())
     cells = max(_PER_SPAN**2 * _outer_spans(body), _LEAST_SAMPLES)
     return float(np.sqrt(area / cells))
 
 
-def _outer_spans(body: BSplineVolume | MultiPatch) -> int:
+def _outer_spans(body: BodyLike) -> int:
     """Return the number of knot spans, which are rectangles, on all faces that are not glued."""
-    several, total = as_multipatch(body), 0
+    several, total = as_body(body), 0
     for patch, names in zip(several.patches, several.outer, strict=True):
         spans = [len(breakpoints(row)) - 1 for row in patch.knots]
         total += sum(spans[a] * spans[b] for a, b in map(varying, names))

@@ -10,8 +10,8 @@ from itertools import pairwise
 import numpy as np
 
 from ..arrays import IntArray
+from .body import numbers_of_classes
 from .interface import varying
-from .multipatch import numbers_of_classes
 from .nets import Nets
 
 

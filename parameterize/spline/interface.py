@@ -37,7 +37,7 @@ class Interface:
     --------
     >>> import iga_nn
     >>> halves = [iga_nn.BSplineVolume.from_function(lambda u, v, w, a=a: (u + a, v, w), 4) for a in (0, 1)]
-    >>> print(iga_nn.MultiPatch(tuple(halves), (iga_nn.Interface((0, "u1"), (1, "u0")),)).interfaces[0])
+    >>> print(iga_nn.Body(tuple(halves), (iga_nn.Interface((0, "u1"), (1, "u0")),)).interfaces[0])
     p0_u1 = p1_u0
     """
 

@@ -10,9 +10,9 @@ from functools import cached_property
 import numpy as np
 
 from ..arrays import Array, Floats, IntArray, Knots, Mask
+from .body import shared_numbers
 from .bspline import breakpoints
 from .interface import Interface, axis_side
-from .multipatch import shared_numbers
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,8 +27,8 @@ class Nets:
     interfaces: tuple[Interface, ...] = ()
 
     @property
-    def one_cube(self) -> bool:
-        """Return whether the body is one block that is not glued to itself."""
+    def is_single(self) -> bool:
+        """Return whether the body is one block that is not glued to itself: the image of a cube."""
         return len(self.knots) == 1 and not self.interfaces
 
     @cached_property

@@ -7,8 +7,8 @@ from math import ceil, sqrt
 import numpy as np
 
 from ..arrays import Array, IntArray
+from .body import BodyLike, as_body
 from .bspline import breakpoints, divided_spans
-from .multipatch import MultiPatch, as_multipatch
 from .orientation import FACES
 from .volume import FACE_NAMES, BSplineVolume
 
@@ -31,7 +31,7 @@ class SampledBoundary:
     patches: IntArray  # (n,) of the samples; all three corners of a triangle have the same
 
     @classmethod
-    def of(cls, body: BSplineVolume | MultiPatch, samples: int = SAMPLES) -> "SampledBoundary":
+    def of(cls, body: BodyLike, samples: int = SAMPLES) -> "SampledBoundary":
         """Sample all outer faces with their edges, each span alike.
 
         On six faces or fewer there are at least `samples` a direction; on more, about as many in all as on six, and
@@ -40,16 +40,16 @@ class SampledBoundary:
         """
         if samples < 2:
             raise ValueError(f"samples must be at least 2, got {samples}")
-        several = as_multipatch(body)
+        several = as_body(body)
         share = min(1.0, sqrt(len(FACES) / sum(map(len, several.outer))))
         least = max(2, ceil(share * samples))
         parts = zip(several.patches, several.outer, strict=True)
         return cls._joined([cls._on_faces(patch, _rows(patch, least), names) for patch, names in parts])
 
     @classmethod
-    def on(cls, body: BSplineVolume | MultiPatch, *rows: Array) -> "SampledBoundary":
+    def on(cls, body: BodyLike, *rows: Array) -> "SampledBoundary":
         """Sample all outer faces, those of all patches at the same three rows of parameters, each from 0 to 1."""
-        several = as_multipatch(body)
+        several = as_body(body)
         parts = zip(several.patches, several.outer, strict=True)
         return cls._joined([cls._on_faces(patch, rows, names) for patch, names in parts])
 

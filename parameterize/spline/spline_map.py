@@ -5,8 +5,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..arrays import Array, Knots
+from .body import Body
 from .bspline import greville, interpolate_grid
-from .multipatch import MultiPatch
 from .nets import Nets
 from .volume import BSplineVolume
 
@@ -50,15 +50,13 @@ class SplineMap:
     @property
     def volume(self) -> BSplineVolume:
         """Return the same map of one cube as a volume."""
-        assert self.nets.one_cube
+        assert self.nets.is_single
         return self.patch(0)
 
     @property
-    def body(self) -> BSplineVolume | MultiPatch:
-        """Return the same map as a volume, or as several patches where there are several blocks."""
-        if self.nets.one_cube:
-            return self.volume
-        return MultiPatch(tuple(self.patch(k) for k in range(len(self.nets.knots))), self.nets.interfaces)
+    def body(self) -> Body:
+        """Return the same map as a body, a patch for each block."""
+        return Body(tuple(self.patch(k) for k in range(len(self.nets.knots))), self.nets.interfaces)
 
     def with_control(self, control: Array) -> "SplineMap":
         """Return the map on the same knots with other control points (3, n)."""

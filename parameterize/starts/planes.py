@@ -18,7 +18,6 @@ from ..optimization.surface_distance import TANGENTIAL, SurfaceFit
 from ..optimization.term import Weights
 from ..progress import timed
 from ..quality.distances import nearest_on_boundary
-from ..spline.multipatch import as_multipatch
 from ..spline.sampled_boundary import SampledBoundary
 from ..spline.spline_map import SplineMap
 from ..spline.volume import FACE_NAMES
@@ -60,7 +59,7 @@ def _surface_fit(task: Task, first: SplineMap) -> SurfaceFit:
     points, faces = task.surface.to_unit(task.surface.vertices), task.surface.faces
     body = first.body
     patches, parameters, _ = nearest_on_boundary(points, body, SampledBoundary.of(body))
-    outer = np.array([[name in names for name in FACE_NAMES] for names in as_multipatch(body).outer])
+    outer = np.array([[name in names for name in FACE_NAMES] for names in body.outer])
     owners = 6 * patches + np.argmax(on_faces(parameters) & outer[patches], axis=1)
     return SurfaceFit(
         SlidingParameters(first.nets, parameters, owners, faces),

@@ -10,9 +10,9 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from parameterize.arrays import Array, in_brackets
+from parameterize.spline.body import all_control_points, size_of
 from parameterize.spline.bspline import basis_derivatives, breakpoints, sparse_rows
 from parameterize.spline.interface import axis_side
-from parameterize.spline.multipatch import all_control_points, size_of
 from parameterize.spline.volume import FACE_NAMES, BSplineVolume
 
 from ..field import Points

@@ -12,8 +12,8 @@ from typing import Protocol
 import numpy as np
 
 from parameterize.arrays import Array, IntArray, Mask
+from parameterize.spline.body import shared_numbers
 from parameterize.spline.interface import Interface
-from parameterize.spline.multipatch import shared_numbers
 
 from .space import TrialSpace
 

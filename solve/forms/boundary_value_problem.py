@@ -11,8 +11,8 @@ from typing import ClassVar, Self
 import numpy as np
 
 from parameterize.arrays import Array
-from parameterize.spline.multipatch import MultiPatch
-from parameterize.spline.volume import FACE_NAMES, BSplineVolume
+from parameterize.spline.body import BodyLike
+from parameterize.spline.volume import FACE_NAMES
 
 from ..field import MultiPatchField, SplineField
 from .condition import WITH_FACTOR, Condition
@@ -155,7 +155,7 @@ class BoundaryValueProblem:
         """Return the data that are formulas: role, datum, and each formula of the datum."""
         return [(role, datum, entry) for role, datum in self.data.items() for entry in datum.formulas]
 
-    def on(self, body: BSplineVolume | MultiPatch) -> Self:
+    def on(self, body: BodyLike) -> Self:
         """Return the same problem with X, Y, Z measured in a body, which has size 1 in X, Y, Z and its middle at 0.
 
         The middle is that of the bounding box. Raises ValueError for a field of another volume.

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from parameterize.arrays import Array
+from parameterize.spline.body import BodyLike, as_body
 from parameterize.spline.bspline import divided_spans
-from parameterize.spline.multipatch import MultiPatch, as_multipatch
 from parameterize.spline.orientation import FACES, enclosed_volume, face_vectors, orientation
 from parameterize.spline.volume import BSplineVolume
 
@@ -28,14 +28,14 @@ class UnitFrame:
     length: float
 
     @classmethod
-    def of(cls, body: BSplineVolume | MultiPatch) -> "UnitFrame":
+    def of(cls, body: BodyLike) -> "UnitFrame":
         """Return the frame of a body.
 
         The size of the volume follows from the six faces (`enclosed_volume`); the bounding box is that of points on the
         faces, BOX_SAMPLES a span and direction. The folded parts of a map count with the opposite sign.
         Raises ValueError where the volume encloses nothing.
         """
-        patches = as_multipatch(body).patches
+        patches = as_body(body).patches
         samples = (points for volume in patches for points in _face_samples(volume))
         ends = np.array([(points.min(axis=(1, 2)), points.max(axis=(1, 2))) for points in samples])  # (f, 2, 3)
         middle = (ends[:, 0].min(axis=0) + ends[:, 1].max(axis=0)) / 2.0

@@ -12,9 +12,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from parameterize.arrays import Array, IntArray
+from parameterize.spline.body import shared_numbers
 from parameterize.spline.bspline import greville
 from parameterize.spline.interface import Interface, face_layer
-from parameterize.spline.multipatch import shared_numbers
 
 from ..discretization.operator import Operator
 from ..discretization.space import TrialSpace

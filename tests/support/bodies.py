@@ -6,7 +6,7 @@ import numpy as np
 from rational_shapes import quarter_ring
 from volumes import mapped
 
-from parameterize.spline.multipatch import MultiPatch
+from parameterize.spline.body import Body
 from parameterize.spline.volume import BSplineVolume
 
 
@@ -34,7 +34,7 @@ def row_of(places, turns, degrees=(2, 3, 1), shape=(4, 5, 3)):
         return mapped(bent, shape, degrees)
 
     patches = [turned(patch(place), *turn) for place, turn in zip(places, turns, strict=True)]
-    return MultiPatch.from_patches(patches)
+    return Body.from_patches(patches)
 
 
 def exact_ring():
@@ -43,7 +43,7 @@ def exact_ring():
     for number in range(4):
         turn = np.linalg.matrix_power(np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]), number)
         quarters.append(replace(quarter, control_points=quarter.control_points @ turn.T))
-    return MultiPatch.from_patches(quarters)
+    return Body.from_patches(quarters)
 
 
 def ring(patches, shape=(6, 4, 3), degrees=(2, 2, 1), twist=0.0):
@@ -58,4 +58,4 @@ def ring(patches, shape=(6, 4, 3), degrees=(2, 2, 1), twist=0.0):
 
         return mapped(place, shape, degrees)
 
-    return MultiPatch.from_patches([part(number) for number in range(patches)])
+    return Body.from_patches([part(number) for number in range(patches)])

@@ -3,7 +3,7 @@
 import numpy as np
 
 from iga_nn.io.mfem_layout import CORNERS
-from parameterize.spline.multipatch import MultiPatch
+from parameterize.spline.body import Body
 from parameterize.spline.volume import FACE_NAMES
 
 
@@ -19,7 +19,7 @@ def geopdes_patch(volume, name=None, scale=1.0):
     return lines + [row((weights * x).ravel(order="F")) for x in (*np.moveaxis(volume.control_points, -1, 0), 1.0)]
 
 
-def geopdes(body: MultiPatch, head="# nurbs mesh v.2.1\n#\n# 24-Jun-2015\n#\n", scale=1.0):
+def geopdes(body: Body, head="# nurbs mesh v.2.1\n#\n# 24-Jun-2015\n#\n", scale=1.0):
     """Patches, interfaces with their orientation, a subdomain and a boundary, as `nrbexport` of the NURBS toolbox."""
     lines = [f" 3 3 {len(body)} {len(body.interfaces)} 1"]
     for number, patch in enumerate(body):
@@ -50,7 +50,7 @@ def mfem_patches(kind="controlpoints", weight=1):
     return "\n".join([head, *patches])
 
 
-def mfem_shuffled(body: MultiPatch, seed=0):
+def mfem_shuffled(body: Body, seed=0):
     """The patches of a right-handed body in MFEM's format, with their vertices numbered at random."""
     corners = [patch.control_points[np.ix_(*[[0, -1]] * 3)] for patch in body]
     points = np.unique(np.round(np.reshape(corners, (-1, 3)), 9), axis=0)

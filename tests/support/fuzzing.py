@@ -72,7 +72,7 @@ from iga_nn.workflow.verdict import certified_facts
 from parameterize.checkpoint import Checkpoints
 from parameterize.cube.boundary_map import BoundaryMap
 from parameterize.run import corner_vertices
-from parameterize.spline.multipatch import MultiPatch
+from parameterize.spline.body import Body
 from parameterize.spline.volume import BSplineVolume
 from parameterize.surface.surface import MeshError
 from solve.field import SplineField
@@ -332,7 +332,7 @@ def glued(n, degree):
     shifted = points + (points[-1:] - points[:1])
     shifted[0] = points[-1]
     second = BSplineVolume.uniform(shifted.transpose(1, 0, 2, 3)[:, :, ::-1], degree)
-    return MultiPatch.from_patches([first, second])
+    return Body.from_patches([first, second])
 
 
 def field_on(volume, coefficients):

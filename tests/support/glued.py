@@ -2,15 +2,15 @@
 
 import numpy as np
 
+from parameterize.spline.body import Body
 from parameterize.spline.interface import gap
-from parameterize.spline.multipatch import MultiPatch
 
 POINTS = np.random.default_rng(7).random((40, 3))
 
 
 def demand_same(again, body):
     """The same patches in the same order, bit by bit, with the same interfaces; no gap in any."""
-    assert isinstance(again, MultiPatch) and len(again) == len(body)
+    assert isinstance(again, Body) and len(again) == len(body)
     for one, other in zip(again, body, strict=True):
         assert one.degrees == other.degrees
         assert np.array_equal(one.control_points, other.control_points)

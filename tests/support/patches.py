@@ -4,8 +4,8 @@ from itertools import permutations, product
 
 import numpy as np
 
+from parameterize.spline.body import Body
 from parameterize.spline.interface import Interface
-from parameterize.spline.multipatch import MultiPatch
 from parameterize.spline.volume import BSplineVolume
 
 SYMMETRIES = [(axes, flips) for axes in permutations(range(3)) for flips in product((False, True), repeat=3)]  # 48
@@ -44,7 +44,7 @@ def grid(*counts):
 
 def frame():
     """The edges of a cube of 3 x 3 x 3 cells: 20 patches, five handles."""
-    return MultiPatch.from_patches(cells([cell for cell in np.ndindex(3, 3, 3) if sum(i == 1 for i in cell) < 2]))
+    return Body.from_patches(cells([cell for cell in np.ndindex(3, 3, 3) if sum(i == 1 for i in cell) < 2]))
 
 
 def sector(start, end, height=1.0, radius=0.5):
@@ -62,7 +62,7 @@ def sector(start, end, height=1.0, radius=0.5):
 
 def plate_with_hole(control_points=6):
     """A square plate of side 2 with a hole of radius 1/2: eight patches."""
-    return MultiPatch.from_patches([patch(sector(k, k + 1), control_points) for k in range(8)])
+    return Body.from_patches([patch(sector(k, k + 1), control_points) for k in range(8)])
 
 
 def ring(start, end, radius=lambda angle: 1.0 + 0.0 * angle, lift=lambda angle: 0.0 * angle, shift=0.0):
@@ -84,7 +84,7 @@ def around_a_line(count):
         return lambda u, v, w: (cos * u - sin * v, sin * u + cos * v, w)
 
     interfaces = (Interface((k, "u0"), ((k + 1) % count, "v0")) for k in range(count))
-    return MultiPatch(tuple(patch(place(k)) for k in range(count)), tuple(interfaces))
+    return Body(tuple(patch(place(k)) for k in range(count)), tuple(interfaces))
 
 
 def slit(gap, bend):
@@ -100,7 +100,7 @@ def slit(gap, bend):
 
         return at
 
-    return MultiPatch.from_patches([patch(place(k), 8) for k in range(4)])
+    return Body.from_patches([patch(place(k), 8) for k in range(4)])
 
 
 def met_twice():
@@ -121,4 +121,4 @@ def met_twice():
             if (other, above) in number:
                 faces = (number[block, place], f"{name}1"), (number[other, above], f"{name}0")
                 interfaces.append(Interface(*faces))
-    return MultiPatch(tuple(cells([place for _, place in places])), tuple(interfaces))
+    return Body(tuple(cells([place for _, place in places])), tuple(interfaces))

@@ -9,8 +9,8 @@ import pyvista
 from scipy.spatial import cKDTree
 
 from parameterize.skeleton.graph import Branch, Skeleton
+from parameterize.spline.body import shared_numbers
 from parameterize.spline.interface import face_layer
-from parameterize.spline.multipatch import shared_numbers
 from parameterize.spline.volume import FACE_NAMES
 from parameterize.surface.geometry import edge_table, signed_volume
 

@@ -1,0 +1,22 @@
+"""Knows the public names of earlier versions: each goes on working, with a warning that says what it is called now."""
+
+import warnings
+
+RENAMED = {  # a name of a package -> its name now
+    "iga_nn.MultiPatch": "Body",
+    "parameterize.BodyCertificate": "Certificate",
+    "solve.MultiPatchField": "BodyField",
+    "solve.MultiPatchSolution": "Solution",
+}
+
+
+def renamed(package: str, name: str) -> str:
+    """Return the name that a package has now for one that it had, with a DeprecationWarning.
+
+    Raises AttributeError for a name that the package never had.
+    """
+    now = RENAMED.get(f"{package}.{name}")
+    if now is None:
+        raise AttributeError(f"module {package!r} has no attribute {name!r}")
+    warnings.warn(f"{package}.{name} is now called {package}.{now}", DeprecationWarning, stacklevel=3)
+    return now

@@ -1,0 +1,30 @@
+"""Names of earlier versions: they go on working, with a warning that says the new one."""
+
+import importlib
+import pickle
+
+import pytest
+
+import iga_nn
+from parameterize.old_names import RENAMED
+from solve import benchmark_volume
+
+
+@pytest.mark.parametrize("old", [name for name in RENAMED if not name.startswith("solve")])
+def test_an_old_name_is_the_new_one_with_a_warning(old):
+    package, name = old.split(".")
+    module = importlib.import_module(package)
+    with pytest.warns(DeprecationWarning, match=f"{old} is now called {package}.{RENAMED[old]}"):
+        assert getattr(module, name) is getattr(module, RENAMED[old])
+
+
+@pytest.mark.parametrize("name", ["Nothing", "nothing"])
+def test_a_name_that_never_was_is_no_attribute(name):
+    with pytest.raises(AttributeError, match=f"module 'iga_nn' has no attribute '{name}'"):
+        getattr(iga_nn, name)
+
+
+def test_a_body_of_an_earlier_pickle_is_found():
+    body = iga_nn.Body((benchmark_volume(1),))
+    earlier = pickle.dumps(body, protocol=0).replace(b"spline.body\nBody", b"spline.multipatch\nMultiPatch")
+    assert b"multipatch" in earlier and type(pickle.loads(earlier)) is iga_nn.Body
