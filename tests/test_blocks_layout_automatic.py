@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from thick_graphs import curve, exposed_genus, genus, loop, thick
 
-from parameterize.blocks.inside import Body
 from parameterize.blocks.layout import LayoutError, block_layout
 from parameterize.certificate.body import certify
 from parameterize.certificate.boundary import check_boundary
 from parameterize.skeleton.graph import Skeleton
-from parameterize.spline.body import Body as SplineBody
+from parameterize.spline.body import Body
+from parameterize.surface.solid import Solid
 
 HUB, X, Y, Z = np.zeros(3), *np.eye(3)
 
@@ -57,11 +57,11 @@ def start(request):
 
 def test_a_start_is_right_handed_inside_the_body_and_of_its_genus(start):
     layout, vertices, faces, skeleton = start
-    body = SplineBody(tuple(block.spline for block in layout.blocks), layout.interfaces)
+    body = Body(tuple(block.spline for block in layout.blocks), layout.interfaces)
     certificate = certify(body)
     assert certificate.verdict == "certified" and not any(patch.left_handed for patch in certificate.patches)
     assert check_boundary(body).injective
-    assert Body(vertices, faces).contains(layout.corners).all()
+    assert Solid(vertices, faces).contains(layout.corners).all()
     assert exposed_genus(layout) == genus(vertices, faces) == skeleton.handles
 
 

@@ -5,10 +5,10 @@ import pytest
 from thick_graphs import curve, loop, thick
 
 from parameterize.blocks.frames import angle_about
-from parameterize.blocks.inside import Body
 from parameterize.blocks.rings import PARTS, ring
 from parameterize.blocks.rods import ends_turned, rod
 from parameterize.blocks.room import Room
+from parameterize.surface.solid import Solid
 
 X, Y, Z = np.eye(3)
 SQUARE = 0.1 * np.array([[-X - Y, -X + Y], [X - Y, X + Y]])  # corners [u][v], right-handed with Z
@@ -22,7 +22,7 @@ def turned(corners, angle):
 @pytest.fixture(scope="module")
 def straight():
     skeleton, vertices, faces = thick([-Z, Z], [(0, 1, curve(-Z, Z))])
-    return skeleton.branches[0], Room(skeleton, Body(vertices, faces))
+    return skeleton.branches[0], Room(skeleton, Solid(vertices, faces))
 
 
 def test_the_turn_between_two_faces_is_the_least_and_spread_out(straight):
@@ -45,7 +45,7 @@ def test_two_faces_near_each_other_are_joined_by_one_straight_piece(straight):
 
 def test_sections_of_a_flat_body_are_flat():
     skeleton, vertices, faces = thick([-Z, Z], [(0, 1, curve(-Z, Z))])
-    wide = Room(skeleton, Body(vertices * [1.8, 1.0, 1.0], faces))
+    wide = Room(skeleton, Solid(vertices * [1.8, 1.0, 1.0], faces))
     branch = skeleton.branches[0]
     found = rod(branch.points, branch.radii, (0.2, 1.8), None, None, wide)
     width, height = (
@@ -57,7 +57,7 @@ def test_sections_of_a_flat_body_are_flat():
 def test_a_ring_closes_after_quarter_turns():
     points = loop(0 * X, X, Y, 0.8) + 0.3 * np.sin(3 * np.linspace(0.0, 2 * np.pi, 61))[:, None] * Z
     skeleton, vertices, faces = thick([points[0]], [(0, 0, points)])
-    found, quarters = ring(points, skeleton.branches[0].radii, Room(skeleton, Body(vertices, faces)))
+    found, quarters = ring(points, skeleton.branches[0].radii, Room(skeleton, Solid(vertices, faces)))
     sections = found.sections(np.ones(len(found.centers)))
     assert np.array_equal(sections[-1], np.rot90(sections[0], quarters)) and (len(sections) - 1) % PARTS == 0
     sides = np.linalg.norm(np.diff(sections, axis=0), axis=-1)

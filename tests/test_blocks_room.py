@@ -5,17 +5,17 @@ import trimesh
 from shapes import CORNERS, CUBE_FACES
 
 from parameterize.blocks.centering import centered
-from parameterize.blocks.inside import Body
 from parameterize.blocks.rings import ring
 from parameterize.blocks.room import Room
 from parameterize.skeleton.graph import Branch, Skeleton
+from parameterize.surface.solid import Solid
 
 HEIGHT = 3.0  # of a tube between radii 0.8 and 1
 
 
 def tube():
     mesh = trimesh.creation.annulus(0.8, 1.0, HEIGHT, sections=48)
-    return Body(np.asarray(mesh.vertices), np.asarray(mesh.faces))
+    return Solid(np.asarray(mesh.vertices), np.asarray(mesh.faces))
 
 
 def circle(heights, body):
@@ -26,7 +26,7 @@ def circle(heights, body):
 
 
 def test_the_room_of_a_branch_ends_where_another_is_nearer():
-    body = Body(CORNERS, CUBE_FACES)
+    body = Solid(CORNERS, CUBE_FACES)
     lines = [np.linspace([x, 0.5, 0.1], [x, 0.5, 0.9], 50) for x in (0.25, 0.75)]
     nodes = np.concatenate([line[[0, -1]] for line in lines])
     branches = tuple(Branch((2 * k, 2 * k + 1), line, body.depths(line)) for k, line in enumerate(lines))

@@ -8,13 +8,13 @@ from test_blocks_layout_automatic import GRAPHS
 from thick_graphs import curve, exposed_genus, thick
 
 from parameterize.blocks import layout as layouts
-from parameterize.blocks.inside import Body
 from parameterize.blocks.layout import Block, BlockLayout, block_layout
 from parameterize.blocks.rows import with_rows
 from parameterize.blocks.strips import Crossing, Cuts, divided
 from parameterize.certificate.body import certify
 from parameterize.certificate.boundary import check_boundary
-from parameterize.spline.body import Body as SplineBody
+from parameterize.spline.body import Body
+from parameterize.surface.solid import Solid
 
 X, Y, Z = np.eye(3)
 
@@ -39,7 +39,7 @@ def hand(*others):
 
 
 def rows_of(skeleton, vertices, faces):
-    return with_rows(skeleton, Body(vertices, faces))
+    return with_rows(skeleton, Solid(vertices, faces))
 
 
 @pytest.mark.parametrize("others", [(ARM,), (ARM, THUMB)], ids=["arm", "arm_and_thumb"])
@@ -70,11 +70,11 @@ def test_limbs_that_part_at_once_have_no_row(name):
 def test_the_flat_part_is_cut_into_a_strip_for_each_finger(others):
     skeleton, vertices, faces = hand(*others)
     layout = block_layout(skeleton, vertices, faces)
-    body = SplineBody(tuple(block.spline for block in layout.blocks), layout.interfaces)
+    body = Body(tuple(block.spline for block in layout.blocks), layout.interfaces)
     certificate = certify(body)
     assert certificate.verdict == "certified" and not any(patch.left_handed for patch in certificate.patches)
     assert check_boundary(body).injective
-    assert Body(vertices, faces).contains(layout.corners).all()
+    assert Solid(vertices, faces).contains(layout.corners).all()
     assert exposed_genus(layout) == 0 and len(body.parts) == 1
     strips = Counter(block.name.partition(", strip")[0] for block in layout.blocks)
     assert set(strips.values()) <= {1, len(LATERAL)} and len(LATERAL) in strips.values()

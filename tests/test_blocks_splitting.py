@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from thick_graphs import curve, thick
 
-from parameterize.blocks.inside import Body
 from parameterize.blocks.merging import merge
 from parameterize.blocks.splitting import junction_at, split
+from parameterize.surface.solid import Solid
 
 X, Y, Z = np.eye(3)
 
@@ -18,7 +18,7 @@ def star(*tips):
 
 def made(nodes, edges):
     skeleton, vertices, faces = thick(nodes, edges)
-    return skeleton, Body(vertices, faces)
+    return skeleton, Solid(vertices, faces)
 
 
 def in_plane(*degrees):

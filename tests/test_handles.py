@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from thick_bodies import BALL, eared, plate
 
-from parameterize.blocks.inside import Body
 from parameterize.blocks.room import Room
 from parameterize.certificate.boundary import check_boundary
 from parameterize.handles.cutting import without_handles
@@ -14,15 +13,15 @@ from parameterize.skeleton.solid import skeleton_of
 from parameterize.spline.body import Body as SplineBody
 from parameterize.spline.volume import BSplineVolume
 from parameterize.surface.geometry import signed_volume
+from parameterize.surface.solid import Solid
 from parameterize.surface.topology import genus_of
-from parameterize.training.samples import interior_points
 
 
 @pytest.fixture(scope="module")
 def body():
     vertices, faces, genus = eared()
     skeleton = skeleton_of(vertices, faces, genus)
-    return vertices, faces, skeleton, handles_of(skeleton, interior_points(vertices, faces, 0.03))
+    return vertices, faces, skeleton, handles_of(skeleton, Solid(vertices, faces).lattice(0.03))
 
 
 def test_each_ear_is_a_handle(body):
@@ -36,7 +35,7 @@ def test_each_ear_is_a_handle(body):
 
 def test_holes_of_a_plate_and_a_ring_alone_are_no_handles_of_a_body():
     vertices, faces, genus = plate([(-1.5, 0.0), (1.5, 0.0)])
-    assert handles_of(skeleton_of(vertices, faces, genus), interior_points(vertices, faces, 0.03)) == ()
+    assert handles_of(skeleton_of(vertices, faces, genus), Solid(vertices, faces).lattice(0.03)) == ()
 
 
 def test_the_body_without_its_handles_has_none(body):
@@ -63,7 +62,7 @@ def test_stubs_are_glued_to_whole_faces_and_the_body_stays_as_it_is(body):
         right = handle.curve[:, 0].mean() > 0.0
         places = [np.array([[float(right), 0.5 + x[1], 0.5]]) for x in (handle.curve[0], handle.curve[-1])]
         ends.append(tuple(footprint(place, np.array([int(right)]), spans) for place in places))
-    layout, parts = stub_layout(volume, ends, handles, Room(skeleton, Body(vertices, faces)))
+    layout, parts = stub_layout(volume, ends, handles, Room(skeleton, Solid(vertices, faces)))
     rods = layout.blocks[: len(layout.blocks) - len(parts)]
     assert len(rods) == 2 and all(rod.spans[:2] == (ACROSS, ACROSS) for rod in rods)
     glued = [face for one in layout.interfaces for face in (one.first, one.second)]

@@ -52,6 +52,17 @@ def test_no_torch_until_training_starts_and_no_vtk_until_a_figure(use, tmp_path)
     assert done.stdout.strip() == "[]", done.stderr
 
 
+def test_exact_blocks_are_made_without_torch_and_other_heavy_libraries(tmp_path):
+    code = (
+        "import iga_nn, sys\n"
+        "config = iga_nn.preset('fast').with_control_points(6)\n"
+        "made = iga_nn.parameterize(iga_nn.sample('cube'), config, device='cpu')\n"
+        f"print(made.origin, [m for m in {(*HEAVY, 'skimage', 'manifold3d')} if m in sys.modules])"
+    )
+    done = python("-c", code, cwd=tmp_path)
+    assert done.stdout.split() == ["planes", "[]"], done.stderr
+
+
 def test_every_public_name_is_there():
     for name in iga_nn.__all__:
         assert getattr(iga_nn, name) is not None

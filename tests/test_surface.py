@@ -26,8 +26,9 @@ from mesh_files import (
 )
 from surface_files import ACCEPTED, REFUSED
 
-from parameterize.surface.geometry import deepest_point, signed_volume
+from parameterize.surface.geometry import signed_volume
 from parameterize.surface.readers.common import BYTES_AT_LEAST
+from parameterize.surface.solid import Solid
 from parameterize.surface.surface import MeshError, load_surface, surface_from_arrays
 from parameterize.surface.triangulation import triangulate
 
@@ -336,7 +337,7 @@ def test_placement_puts_the_deepest_point_in_the_middle_and_volume_to_one():
 def test_the_deepest_point_of_a_tetrahedron_is_its_incenter():
     """Corner tetrahedron: r = 3 V / A = (1/2) / (3/2 + sqrt(3)/2), incentre (r, r, r)."""
     radius = 1.0 / (3.0 + np.sqrt(3.0))
-    point, depth = deepest_point(*TETRAHEDRON)
+    point, depth = Solid(*TETRAHEDRON).deepest()
     assert depth == pytest.approx(radius, rel=1e-3)
     assert depth <= radius
     assert point == pytest.approx([radius] * 3, rel=0.02)
@@ -443,7 +444,7 @@ def test_real_models_are_accepted_unchanged(path):
     given = np.array([[float(x) for x in row[1:4]] for row in rows if row[:1] == ["v"]])
     assert np.array_equal(surface.vertices, given)
     assert len(surface.faces) == sum(row[:1] == ["f"] for row in rows)
-    _, depth = deepest_point(surface.unit_vertices, surface.faces)
+    _, depth = Solid(surface.unit_vertices, surface.faces).deepest()
     assert 0.2 < depth < 0.62035  # the ball of volume 1 has radius 0.62035
 
 

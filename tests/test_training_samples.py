@@ -1,19 +1,16 @@
-import tracemalloc
 from itertools import product
 
 import numpy as np
 import pytest
 import torch
 from scipy.spatial import cKDTree
-from shapes import ball, enclosed_volume, rounded_cube, turned
+from shapes import ball, rounded_cube
 
+from parameterize.surface.solid import Solid
 from parameterize.training.samples import (
     OFFSETS,
     TriangleSampler,
     gather,
-    interior_points,
-    near_or_inside,
-    signed_distance,
     stencils,
 )
 
@@ -43,13 +40,13 @@ def test_stencils_cover_the_domain_under_every_shift():
     vertices, faces = rounded_cube(600)
     found = make_stencils(vertices, faces)
     centres = found.nodes[found.index[:, 0]].numpy()
-    points = CELL / 3.0 * near_or_inside(vertices, faces, CELL / 3.0, 0.0)
-    points = np.concatenate([points[signed_distance(points, vertices, faces) < 0.0], vertices])
+    points = CELL / 3.0 * Solid(vertices, faces).lattice_near(CELL / 3.0, 0.0)
+    points = np.concatenate([points[Solid(vertices, faces).signed_distances(points) < 0.0], vertices])
     for corner in product((-0.5, 0.5), repeat=3):
         reach, _ = cKDTree(centres + CELL * np.array(corner)).query(points, p=np.inf)
         assert (reach <= CELL).mean() > 0.999  # a stencil reaches one cell from its centre
         assert reach.max() < 1.2 * CELL
-    assert signed_distance(centres, vertices, faces).max() < CELL  # and not far beyond the surface
+    assert Solid(vertices, faces).signed_distances(centres).max() < CELL  # and not far beyond the surface
 
 
 def test_shifts_move_all_nodes_together_within_half_a_cell():
@@ -64,15 +61,6 @@ def test_shifts_move_all_nodes_together_within_half_a_cell():
     assert shifts.abs().max() <= 0.5 and shifts.min() < -0.4 and shifts.max() > 0.4
     again = found.shifted(torch.Generator().manual_seed(0)) - found.nodes
     assert again[0] / CELL == pytest.approx(shifts[0])
-
-
-def test_interior_points_fill_the_volume():
-    vertices, faces = ball(1500)
-    points = interior_points(vertices, faces, 0.1)
-    assert np.linalg.norm(points, axis=1).max() < 1.0
-    assert len(points) * 0.1**3 == pytest.approx(4.0 / 3.0 * np.pi, rel=0.02)
-    assert signed_distance(np.zeros((1, 3)), vertices, faces)[0] == pytest.approx(-1.0, abs=0.01)
-    assert signed_distance(np.array([[0.0, 2.0, 0.0]]), vertices, faces)[0] == pytest.approx(1.0, abs=0.01)
 
 
 def strip(widths):
@@ -120,36 +108,3 @@ def test_gathered_rows_have_a_repeatable_gradient():
     for _ in range(300):  # plain indexing differs about once in 70 times on two threads
         (again,) = torch.autograd.grad((gather(rows, index) * weights).sum(), rows)
         assert torch.equal(first, again)
-
-
-def whole_lattice(vertices, cell, margin):
-    low, high = np.floor((vertices.min(0) - margin) / cell), np.ceil((vertices.max(0) + margin) / cell)
-    return np.stack(np.meshgrid(*map(np.arange, low, high + 1.0), indexing="ij"), axis=-1).reshape(-1, 3)
-
-
-@pytest.mark.parametrize("stretch", [(1.0, 1.0, 1.0), (3.0, 1.0, 0.5), (6.0, 0.4, 0.4)])
-def test_nothing_inside_is_left_out_of_the_lattice(stretch):
-    vertices, faces = ball(500)
-    vertices = turned(vertices * stretch, (0.5, 0.9, -0.4))
-    everywhere = whole_lattice(vertices, CELL, CELL / 2.0)
-    distances = signed_distance(CELL * everywhere, vertices, faces)
-    inside = everywhere[distances < 0.0]
-    assert interior_points(vertices, faces, CELL) == pytest.approx(CELL * inside)
-    close = everywhere[distances < CELL / 2.0]
-    found = near_or_inside(vertices, faces, CELL, CELL / 2.0)
-    assert {tuple(row) for row in close.astype(int).tolist()} <= {tuple(row) for row in found.tolist()}
-    assert np.array_equal(found, np.unique(found, axis=0))  # each once, in their order
-
-
-@pytest.mark.parametrize("count", [pytest.param(12, marks=pytest.mark.slow), 400])
-def test_a_needle_askew_takes_the_memory_of_what_is_in_it(count):
-    """Of the box around it, 16 cubed, the lattice has 4 million points, and the needle some 5000 of them."""
-    vertices, faces = ball(count)
-    vertices = turned(vertices * [14.0, 0.35, 0.35], (0.0, -0.62, 0.79))
-    assert np.ptp(vertices, axis=0).min() > 14.0
-    tracemalloc.start()
-    points = interior_points(vertices, faces, CELL)
-    taken = tracemalloc.get_traced_memory()[1]
-    tracemalloc.stop()
-    assert len(points) * CELL**3 == pytest.approx(enclosed_volume(vertices, faces), rel=0.1)
-    assert taken < 50e6  # the coordinates of all would take 75 and more, and there were several arrays

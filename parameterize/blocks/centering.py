@@ -6,8 +6,8 @@ import numpy as np
 
 from ..arrays import Array
 from ..skeleton.graph import Branch, Skeleton
+from ..surface.solid import Solid
 from .frames import arc_lengths, at_lengths, carried, tangents, turned, unit
-from .inside import Body
 from .room import Room
 
 _ROUNDS = 6
@@ -18,7 +18,7 @@ _DEEP = 0.5  # of the way to the surface: no place moves farther in a round
 _SHARES = 1.0, 0.5, 0.25  # of a step, until the curve stays inside
 
 
-def centered(skeleton: Skeleton, body: Body) -> Skeleton:
+def centered(skeleton: Skeleton, body: Solid) -> Skeleton:
     """Return the skeleton of a ring with its curve through the centroids of the sections across it.
 
     Other skeletons are returned as they are: where branches meet, sections belong to several of them.
@@ -30,7 +30,7 @@ def centered(skeleton: Skeleton, body: Body) -> Skeleton:
     return skeleton
 
 
-def _moved(skeleton: Skeleton, body: Body) -> Skeleton:
+def _moved(skeleton: Skeleton, body: Solid) -> Skeleton:
     """Return the skeleton after one step towards the middles, shorter where the curve would leave the body."""
     (branch,) = skeleton.branches
     count = int(np.clip(branch.length / (_STEP * float(np.median(branch.radii))), _FEWEST, _MOST))

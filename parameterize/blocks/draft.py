@@ -7,9 +7,9 @@ import numpy as np
 from ..arrays import Array, Mask
 from ..skeleton.graph import Branch, Skeleton
 from ..spline.interface import face_layer, outward
+from ..surface.solid import Solid
 from .checks import folded
 from .frames import at_lengths
-from .inside import Body
 from .junctions import Junction, junction
 from .rings import ring
 from .rods import Rod, ends_turned, rod
@@ -40,12 +40,12 @@ class Draft:
     ----------
     skeleton : Skeleton
         Of nodes with one, or three to six branches; or a circle.
-    body : Body
+    body : Solid
     rows : mapping of int to Row
         The nodes at which limbs begin side by side.
     """
 
-    def __init__(self, skeleton: Skeleton, body: Body, rows: Mapping[int, Row]) -> None:
+    def __init__(self, skeleton: Skeleton, body: Solid, rows: Mapping[int, Row]) -> None:
         self._skeleton, self._body, self._room, self._rows = skeleton, body, Room(skeleton, body), rows
         self._in_rows = {number for row in rows.values() for number, _ in row.limbs}
         self._size = {node: 1.0 for node, degree in enumerate(skeleton.degrees) if degree > 2}

@@ -13,10 +13,10 @@ from ..skeleton.graph import Skeleton
 from ..spline.body import Body as SplineBody
 from ..spline.interface import Face, Interface, face_label, orientations, varying
 from ..spline.volume import FACE_NAMES
+from ..surface.solid import Solid
 from .block import Block
 from .centering import centered
 from .draft import Draft
-from .inside import Body
 from .merging import merge
 from .rings import PARTS
 from .rods import Rod
@@ -124,7 +124,7 @@ def block_layout(
     """
     if not skeleton.branches:
         raise LayoutError("the skeleton is a single point, without limbs or handles: one cube serves such a body")
-    body = Body(vertices, faces)
+    body = Solid(vertices, faces)
     merged = merge(centered(skeleton, body), body)
     in_rows, rows = with_rows(merged, body)
     for row in rows.values():
@@ -138,7 +138,7 @@ def block_layout(
 
 
 def _laid(
-    skeleton: Skeleton, rows: Mapping[int, Row], body: Body, spans: int, where: Callable[[Array], str]
+    skeleton: Skeleton, rows: Mapping[int, Row], body: Solid, spans: int, where: Callable[[Array], str]
 ) -> BlockLayout:
     """Return the start of blocks along a skeleton with some rows of limbs."""
     draft = Draft(split(skeleton, body, rows), body, rows)

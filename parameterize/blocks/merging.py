@@ -10,9 +10,9 @@ from dataclasses import replace
 import numpy as np
 
 from ..skeleton.graph import Branch, Skeleton, without_lone_nodes
+from ..surface.solid import Solid
 from .assignment import MOST
 from .frames import at_lengths
-from .inside import Body
 from .splitting import branch_ends, junction_at, led_to
 
 _SHORT = 2.0  # radii of the thicker node: the length of a branch that may be taken out
@@ -24,7 +24,7 @@ _LOOP = 4.0  # lengths of the branch that is taken out: what another one between
 _FIT = np.radians(50.0)  # between a branch and its face's normal, at most, at the node that takes the place of two
 
 
-def merge(skeleton: Skeleton, body: Body) -> Skeleton:
+def merge(skeleton: Skeleton, body: Solid) -> Skeleton:
     """Return a skeleton of the same body with fewer junctions; the number of loops stays."""
     while True:
         lengths = {
@@ -39,7 +39,7 @@ def merge(skeleton: Skeleton, body: Body) -> Skeleton:
         skeleton = better
 
 
-def _merged(skeleton: Skeleton, number: int, length: float, body: Body) -> Skeleton | None:
+def _merged(skeleton: Skeleton, number: int, length: float, body: Solid) -> Skeleton | None:
     """Return the skeleton with both nodes of a branch made one; None where the other branches do not fit it.
 
     length: of the branch, in radii of its nodes.

@@ -5,7 +5,7 @@ from scipy.spatial import cKDTree
 
 from ..arrays import Array
 from ..skeleton.graph import Skeleton
-from .inside import Body
+from ..surface.solid import Solid
 
 _OWN = 0.75  # of the distance from its place that a point on a ray has from all curves, at least, to belong to it
 _STEPS = 16  # places along a ray at which this is asked
@@ -17,10 +17,10 @@ class Room:
     Parameters
     ----------
     skeleton : Skeleton
-    body : Body
+    body : Solid
     """
 
-    def __init__(self, skeleton: Skeleton, body: Body) -> None:
+    def __init__(self, skeleton: Skeleton, body: Solid) -> None:
         self.body = body
         self._curves = cKDTree(np.concatenate([skeleton.nodes, *(branch.points for branch in skeleton.branches)]))
 

@@ -13,8 +13,8 @@ from scipy.spatial import cKDTree
 from ..arrays import Array, IntArray
 from ..skeleton.graph import Branch, Skeleton, without_lone_nodes
 from ..surface.geometry import connected
+from ..surface.solid import Solid
 from .frames import arc_lengths, at_lengths, tangents
-from .inside import Body
 from .splitting import End, branch_ends, stub
 
 _NEAR = 5.0  # radii of the thicker node: junctions that are nearer are taken as one hub
@@ -60,7 +60,7 @@ class Row:
     limbs: tuple[End, ...]
 
 
-def with_rows(skeleton: Skeleton, body: Body) -> tuple[Skeleton, dict[int, Row]]:
+def with_rows(skeleton: Skeleton, body: Solid) -> tuple[Skeleton, dict[int, Row]]:
     """Return the skeleton with the limbs that leave a flat part side by side in rows, and the rows by their nodes.
 
     The stem of a row ends at the node; the limbs begin beside it.
@@ -108,7 +108,7 @@ def _limbs(skeleton: Skeleton, hub: IntArray) -> list[_Limb]:
     return found
 
 
-def _row(limbs: list[_Limb], radius: float, body: Body) -> list[tuple[_Limb, float]]:
+def _row(limbs: list[_Limb], radius: float, body: Solid) -> list[tuple[_Limb, float]]:
     """Return the limbs that leave a flat part side by side, in order, each with the distance at which it is cut.
 
     The list is empty where they are fewer than three. radius: that of the hub.
@@ -135,7 +135,7 @@ def _row(limbs: list[_Limb], radius: float, body: Body) -> list[tuple[_Limb, flo
     return [(limbs[order[k]], float(cuts[k])) for k in run] if len(run) >= _FEWEST else []
 
 
-def _gap(one: _Limb, other: _Limb, body: Body) -> float:
+def _gap(one: _Limb, other: _Limb, body: Solid) -> float:
     """Return how far from the hub the gap between a limb and another one begins; 0 for limbs that go different ways."""
     nearest = np.asarray(cKDTree(other.points).query(one.points)[1])
     between = one.points + _SAMPLES * (other.points[nearest] - one.points)  # (samples, k, 3)
@@ -155,7 +155,7 @@ def _in_order(limbs: list[_Limb], members: IntArray, gaps: Array) -> IntArray:
     return np.asarray(members[np.argsort(outer @ across)])
 
 
-def _with_row(skeleton: Skeleton, row: list[tuple[_Limb, float]], body: Body) -> Skeleton:
+def _with_row(skeleton: Skeleton, row: list[tuple[_Limb, float]], body: Solid) -> Skeleton:
     """Return the skeleton with a new node, the last one, at which the limbs of a row begin where they are cut."""
     new = len(skeleton.nodes)
     place = np.mean([limb.at(distance) for limb, distance in row], axis=0)
@@ -175,11 +175,11 @@ def _with_row(skeleton: Skeleton, row: list[tuple[_Limb, float]], body: Body) ->
     return replace(skeleton, nodes=nodes, radii=radii, branches=tuple(kept))
 
 
-def _curve(ends: tuple[int, int], points: Array, body: Body) -> Branch:
+def _curve(ends: tuple[int, int], points: Array, body: Solid) -> Branch:
     return Branch(ends, points, body.depths(points))
 
 
-def _tidied(skeleton: Skeleton, hub: IntArray, body: Body) -> Skeleton:
+def _tidied(skeleton: Skeleton, hub: IntArray, body: Solid) -> Skeleton:
     """Return the skeleton without the nodes of a hub at which one branch ends, or two, which become one."""
     for node in (*hub.tolist(), *hub.tolist()):  # what goes at one node may leave another one with two
         ends = branch_ends(skeleton, node)

@@ -8,9 +8,9 @@ import numpy as np
 
 from ..arrays import Array, Mask
 from ..skeleton.graph import Branch, Skeleton
+from ..surface.solid import Solid
 from .assignment import MOST, Assignment, assigned
 from .frames import arc_lengths, at_lengths, unit
-from .inside import Body
 
 _SKEW = np.radians(48.0)  # between a branch and the normal of its face: above, a junction is split where that helps
 _GAIN = np.radians(5.0)  # that the split lowers the largest angle by, at least
@@ -23,7 +23,7 @@ _ROUNDINGS = 10  # of a branch that is led to another node, where it has a kink
 End = tuple[int, int]  # the number of a branch, and 0 for its first end, 1 for its last
 
 
-def split(skeleton: Skeleton, body: Body, rows: Container[int] = ()) -> Skeleton:
+def split(skeleton: Skeleton, body: Solid, rows: Container[int] = ()) -> Skeleton:
     """Return a skeleton of the same body whose nodes have at most six branches, in directions that fit a cube.
 
     rows: the nodes that stay as they are, because they get no cube.
@@ -68,7 +68,7 @@ def junction_at(skeleton: Skeleton, node: int) -> tuple[list[End], Assignment]:
     return ends, assigned(directions(skeleton, node, ends))
 
 
-def _group(skeleton: Skeleton, node: int, ends: list[End], body: Body) -> tuple[int, ...]:
+def _group(skeleton: Skeleton, node: int, ends: list[End], body: Solid) -> tuple[int, ...]:
     """Return which of the branch ends, by their places in the list, leave a second node: () where one serves all."""
     ways = directions(skeleton, node, ends)
     worst = float(assigned(ways).angles.max()) if len(ends) <= MOST else np.inf
@@ -111,7 +111,7 @@ def _skew_of(skeleton: Skeleton, nodes: tuple[int, int]) -> float:
     return skew
 
 
-def _divided(skeleton: Skeleton, node: int, ends: list[End], group: tuple[int, ...], body: Body) -> Skeleton:
+def _divided(skeleton: Skeleton, node: int, ends: list[End], group: tuple[int, ...], body: Solid) -> Skeleton:
     """Return the skeleton with a node divided: the branch ends of the group leave a new node, the last one."""
     center, radius, new = skeleton.nodes[node], float(skeleton.radii[node]), len(skeleton.nodes)
     ways = directions(skeleton, node, ends)

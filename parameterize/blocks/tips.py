@@ -3,15 +3,15 @@
 import numpy as np
 
 from ..skeleton.graph import Branch
+from ..surface.solid import Solid
 from .frames import arc_lengths, at_lengths, unit
-from .inside import Body
 
 _DEPTH = 0.8  # radii of the limb: from the last section to the surface in front of it
 _BACK = 1.5  # radii: how far before the end of the branch the limb's direction is taken
 _ROOM = 0.2  # radii: a limb so short still gets a section beyond that place
 
 
-def tip(branch: Branch, end: int, body: Body) -> float:
+def tip(branch: Branch, end: int, body: Solid) -> float:
     """Return the length from a branch's end (0 or 1) back to the last section of its rod; negative beyond the end.
 
     The branch may end at the surface or well before it: what counts is the surface in front of it.

@@ -9,7 +9,6 @@ chapter 6).
 
 from dataclasses import dataclass, replace
 
-import igl
 import numpy as np
 from scipy.spatial import cKDTree
 
@@ -17,6 +16,7 @@ from ..arrays import Array, Floats, IntArray
 from ..spline.sampled_boundary import SampledBoundary
 from ..spline.spline_map import SplineMap
 from ..surface.geometry import vertex_normals
+from ..surface.solid import Solid
 from .operators import ControlRows, PiecewiseOperator
 from .sliding import SlidingParameters
 from .term import RoundWeights
@@ -29,7 +29,6 @@ _OPPOSITE = -0.5  # cosine of the angle between the normals of opposite samples,
 _CROSSES = 0.3  # the same of samples on different blocks
 _CHUNK = 4096  # samples at a time, which take some 40 MB
 _REACH = 0.05  # distance from a contact, in a domain of volume 1, within which a round's steps look for others
-_ACCURACY = 2.0  # of the fast winding number
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,10 +88,8 @@ def contact_penalty(spline: SplineMap, gap: float = _GAP, near: IntArray | None 
     asked = np.arange(len(boundary.points)) if near is None else near
     touching = asked
     if len(asked):
-        winding = igl.FastWindingNumberBVH()
-        winding.init(boundary.points, boundary.triangles)
         outside = boundary.points[asked] + gap * normals[asked]  # just outside, yet the boundary may wind around it
-        touching = asked[winding.winding_number(outside, _ACCURACY) > 0.5]
+        touching = asked[Solid(boundary.points, boundary.triangles).contains(outside)]
     near = _around(boundary.points, touching) if near is None else near
     touching, facing = _facing_samples(boundary.points, normals, boundary.patches, touching)
     first, second = (

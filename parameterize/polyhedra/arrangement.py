@@ -11,7 +11,7 @@ from typing import Literal
 import numpy as np
 
 from ..arrays import Array
-from ..blocks.inside import Body
+from ..surface.solid import Solid
 from .polyhedron import Polyhedron
 
 NEAR = 1e-5  # of the diagonal: points this near to a plane lie in it, and this near to a vertex are the vertex
@@ -70,7 +70,7 @@ def arrangement_of(body: Polyhedron, beside: Beside | None = None) -> Arrangemen
             return None
     points = _snapped(points, body.vertices[body.corners], near)
     middles = np.array([points[sorted({i for _, ids in cell for i in ids})].mean(axis=0) for cell in cells])
-    inside = Body(body.vertices, body.triangles).contains(middles)
+    inside = Solid(body.vertices, body.triangles).contains(middles)
     first = count if beside == "belts" else len(normals)
     return Arrangement(points, tuple(cells[k] for k in np.flatnonzero(inside)), normals, offsets, first)
 

@@ -8,13 +8,11 @@ and the one that is nearer to it is left out.
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-import igl
 import numpy as np
 from scipy import ndimage
-from skimage.measure import euler_number
 
 from ..arrays import Array, Floats, IntArray, Mask
-from .crossings import crossed_pairs, inside_of
+from ..surface.solid import Solid, crossed_pairs, inside_of
 
 FIRST_CELL = 0.04  # at volume 1: 16 000 cells inside, and limbs of a body have radii of .1 and more
 FINER = 2.0**0.5
@@ -84,7 +82,7 @@ def _parted(inside: Mask, corners: Array, vertices: Array, faces: IntArray) -> M
     if len(pairs):
         keys, number = np.unique(np.ravel_multi_index(tuple(pairs.reshape(-1, 3).T), inside.shape), return_inverse=True)
         points = np.stack(np.unravel_index(keys, inside.shape), axis=1).astype(np.float64)
-        squared = igl.point_mesh_squared_distance(points, vertices, faces)[0]
+        squared = Solid(vertices, faces).squared_depths(points)
         nearer = np.argmin(squared[number].reshape(-1, 2), axis=1)
         parted[tuple(pairs[np.arange(len(pairs)), nearer].T)] = False
     return parted
@@ -92,6 +90,8 @@ def _parted(inside: Mask, corners: Array, vertices: Array, faces: IntArray) -> M
 
 def _in_one_piece(inside: Mask, low: Array, cell: float) -> Lattice:
     """Return the largest piece, its cavities filled."""
+    from skimage.measure import euler_number
+
     labels, count = ndimage.label(inside, _ALL_NEIGHBOURS)
     sizes = np.bincount(labels.ravel(), minlength=2)
     sizes[0] = 0

@@ -2,7 +2,6 @@
 
 import numpy as np
 from scipy.spatial import cKDTree
-from skimage.graph import MCP_Geometric
 
 from ..arrays import Array, IntArray
 from .depth import Depth
@@ -32,6 +31,8 @@ def add_limbs(web: Web, depth: Depth, cell: float) -> None:
 
 def _add_found(web: Web, depth: Depth, least: float) -> None:
     """Add the limbs that stick out from the web as it is, of at least this length in cells."""
+    from skimage.graph import MCP_Geometric
+
     distance = MCP_Geometric(np.where(depth.inside, 1.0, -1.0)).find_costs(_in_balls(web, depth).tolist())[0]
     limbs = protrusions(depth.inside, distance, least)
     if not limbs:

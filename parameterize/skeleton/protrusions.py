@@ -11,7 +11,7 @@ import numpy as np
 
 from ..arrays import Array, Floats, IntArray, Mask
 from ..surface.geometry import connected
-from .crossings import DIRECTIONS
+from ..surface.solid import DIRECTIONS
 
 SLAB = 2.0  # cells: more than the longest step between neighbours, so no step leaps over a slab
 SLENDER = 0.75  # length over width: a rod that sticks out by less is pulled out of a block's face as well

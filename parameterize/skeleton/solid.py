@@ -2,11 +2,11 @@
 
 from collections.abc import Callable
 
-import igl
 import numpy as np
 from scipy.spatial import cKDTree
 
 from ..arrays import Array, IntArray, in_brackets
+from ..surface.solid import Solid
 from .contraction import contract, divide, drop_stubs
 from .curves import smoothed
 from .depth import Depth
@@ -47,13 +47,13 @@ def skeleton_of(vertices: Array, faces: IntArray, genus: int, where: Callable[[A
     SkeletonError
         A part is too thin for the finest lattice, or a tunnel is knotted: the body is no thick graph.
     """
-    coarse, found = None, None
+    body, coarse, found = Solid(vertices, faces), None, None
     for coarse in lattices(vertices, faces, genus):
         if not coarse.has_topology(genus):
             continue
         depth = Depth(coarse.inside)
-        skeleton = _measured(_curves(coarse, depth, genus), coarse, vertices, faces)
-        if _is_inside(skeleton, vertices, faces):
+        skeleton = _measured(_curves(coarse, depth, genus), coarse, body)
+        if _is_inside(skeleton, body):
             found = skeleton
             if _is_resolved(skeleton) or coarse.inside.size > ENOUGH:
                 break
@@ -82,10 +82,10 @@ def _curves(lattice: Lattice, depth: Depth, genus: int) -> Web:
     return smoothed(web, depth)
 
 
-def _is_inside(skeleton: Skeleton, vertices: Array, faces: IntArray) -> bool:
-    """Return whether all points of a skeleton lie inside the surface."""
+def _is_inside(skeleton: Skeleton, body: Solid) -> bool:
+    """Return whether all points of a skeleton lie inside the body."""
     points = np.concatenate([skeleton.nodes, *(branch.points for branch in skeleton.branches)])
-    return bool(np.all(igl.fast_winding_number(vertices, faces, points) > 0.5))
+    return bool(np.all(body.contains(points)))
 
 
 def _is_resolved(skeleton: Skeleton) -> bool:
@@ -108,20 +108,16 @@ def _thinnest(lattice: Lattice, vertices: Array) -> Array:
     return lattice.places(points[np.argmin(Depth(lattice.inside).at(points))])
 
 
-def _measured(web: Web, lattice: Lattice, vertices: Array, faces: IntArray) -> Skeleton:
+def _measured(web: Web, lattice: Lattice, body: Solid) -> Skeleton:
     """Return the skeleton with the true distances from the surface."""
-
-    def radii(points: Array) -> Array:
-        return np.sqrt(igl.point_mesh_squared_distance(points, vertices, faces)[0])
-
     number = {key: i for i, key in enumerate(web.nodes)}
     nodes = lattice.places(np.array(list(web.nodes.values())))
     curves = [lattice.places(arc.path) for arc in web.arcs]
     branches = tuple(
-        Branch((number[arc.first], number[arc.last]), points, radii(points))
+        Branch((number[arc.first], number[arc.last]), points, body.depths(points))
         for arc, points in zip(web.arcs, curves, strict=True)
     )
-    at_nodes = radii(nodes)
+    at_nodes = body.depths(nodes)
     index = np.argwhere(lattice.inside)
     samples = lattice.places(index[:: len(index) // SAMPLES + 1])
     centers = np.concatenate([nodes, *curves])

@@ -6,7 +6,6 @@ surface/axis thinning algorithms, CVGIP 56, 1994.
 
 import numpy as np
 from scipy.spatial import cKDTree
-from skimage.morphology import skeletonize
 
 from ..arrays import Array, IntArray, Mask
 from ..surface.geometry import connected
@@ -21,6 +20,8 @@ def web_of(inside: Mask) -> Web:
 
     Points with more than two neighbours that touch each other form one knot, whose middle point is the node.
     """
+    from skimage.morphology import skeletonize
+
     points = np.argwhere(skeletonize(inside))
     pairs = cKDTree(points).query_pairs(_NEIGHBOUR, output_type="ndarray").astype(np.int64)
     pairs = pairs[np.lexsort(pairs.T[::-1])]

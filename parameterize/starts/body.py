@@ -11,7 +11,6 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..arrays import Array, IntArray, Knots
-from ..blocks.inside import Body
 from ..blocks.layout import BlockLayout, LayoutError
 from ..blocks.room import Room
 from ..checkpoint import Checkpoints
@@ -25,6 +24,7 @@ from ..spline.interface import face_layer
 from ..spline.spline_map import SplineMap
 from ..spline.volume import BSplineVolume
 from ..surface.errors import MeshError
+from ..surface.solid import Solid
 from ..surface.surface import surface_from_arrays
 from ..threads import one_blas_thread
 from .blocks import STIFF_WEIGHTS, nets_of, points_of, schedule, softened, surface_fit
@@ -93,7 +93,7 @@ def _with_stubs(task: Task, body: SplineMap, rims: list[tuple[Array, Array]]) ->
     """
     surface, most = task.surface, task.config.blocks
     ends = [(_footprint(body, first), _footprint(body, last)) for first, last in rims]
-    room = Room(task.skeleton, Body(surface.unit_vertices, surface.faces))
+    room = Room(task.skeleton, Solid(surface.unit_vertices, surface.faces))
     layout, parts = stub_layout(body.volume, ends, task.handles, room)
     if most is not None and len(layout) > most:
         raise LayoutError(f"a body with stubs needs {len(layout)} blocks, and at most {most} are allowed: allow more")

@@ -11,11 +11,8 @@ from ..cube.flips import flipped, untangle
 from ..cube.layout import CubeLayout
 from ..optimization.phases import RAMP, Polish, Schedule, Separate, Shape, Unfold
 from ..progress import timed
+from ..surface.solid import Solid
 from ..threads import one_blas_thread
-from ..training.backend import one_thread_an_operation
-from ..training.samples import interior_points
-from ..training.target_shapes import nearest_places
-from ..training.trainer import Trainer, map_points
 from .first_spline import COARSE, first_spline
 from .start import Attempt, Start, Task, optimized
 
@@ -33,6 +30,9 @@ class Network(Start):
 
         None is returned where the training finds the shape too hard, and other starts may follow.
         """
+        from ..training.backend import one_thread_an_operation  # they load torch, which takes a second
+        from ..training.trainer import Trainer, map_points
+
         others = task.most_starts > 1
         if others and task.config.train.easy_loss == 0.0:  # every shape counts as hard
             return None
@@ -55,7 +55,7 @@ class Network(Start):
         with timed(task.seconds, "fit"), one_thread_an_operation(), one_blas_thread():
             mapped = map_points(network, vertices)
             fit = task.fit(_layout(mapped, trainer.corners, task), COARSE)
-            inside = interior_points(vertices, faces, spline.fit_cell)
+            inside = Solid(vertices, faces).lattice(spline.fit_cell)
             places = map_points(network, inside).clip(0.0, 1.0)
             first = first_spline(inside, places, fit)
         return optimized(first, fit, schedule(spline), task, checkpoints)
@@ -75,6 +75,8 @@ def _layout(mapped: Array, corners: IntArray | None, task: Task) -> CubeLayout:
     The layout of nearest points is closer to the network's map. The layout by patches is used where flipped triangles
     remain in the other; it always succeeds where the edges can be traced.
     """
+    from ..training.target_shapes import nearest_places
+
     layout = CubeLayout(*task.mesh, mapped, task.own)
     untangled = untangle(nearest_places(mapped), layout.faces)
     if flipped(untangled, layout.faces).mean() > _FEW_FLIPS:

@@ -7,7 +7,6 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, Literal
 
-import igl
 import numpy as np
 
 from ..arrays import Array, IntArray, in_brackets
@@ -38,9 +37,9 @@ from ..spline.spline_map import SplineMap
 from ..surface.features import features_of
 from ..surface.geometry import normals_and_areas, vertex_quadrics, vertex_weights
 from ..surface.ridges import Ridges
+from ..surface.solid import Solid
 from ..surface.surface import Surface
 from ..threads import one_blas_thread
-from ..training.samples import interior_points
 from .kept_blocks import kept_choice
 
 _log = logging.getLogger(__name__)
@@ -161,8 +160,8 @@ class Task:
         Raises SkeletonError for a body without a skeleton.
         """
         surface = self.surface
-        inside = interior_points(surface.unit_vertices, surface.faces, _CELL)
-        return handles_of(self.skeleton, inside)
+        solid = Solid(surface.unit_vertices, surface.faces)
+        return handles_of(self.skeleton, solid.lattice(_CELL))
 
     @cached_property
     def exact(self) -> BlockLayout | None:
@@ -261,7 +260,7 @@ class Attempt:
         It is large where the map spans a hollow of the surface, whose points are not far from it.
         """
         samples = boundary_samples(self.found.spline, _A_SPAN)
-        squares = igl.point_mesh_squared_distance(samples.points, self.fit.points, self.fit.places.triangles)[0]
+        squares = Solid(self.fit.points, self.fit.places.triangles).squared_depths(samples.points)
         return math.sqrt(np.average(squares, weights=samples.areas))
 
     @property

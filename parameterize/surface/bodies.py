@@ -10,6 +10,7 @@ from ..arrays import Array, IntArray, in_brackets
 from .draft import Draft
 from .errors import MeshError
 from .geometry import connected, directed_edges
+from .solid import Solid
 from .topology import crossing_faces, crossing_places
 from .welding import is_oriented
 
@@ -125,8 +126,8 @@ def _inside(draft: Draft, groups: list[IntArray], outer: int) -> list[int]:
     nested = []
     for i, points in enumerate(corners):
         if i != outer and np.all(points.min(axis=0) > low) and np.all(points.max(axis=0) < high):
-            winding = igl.fast_winding_number(draft.points, draft.faces[groups[outer]], points)
-            if np.all(np.abs(winding) > 0.5):
+            solid = Solid(draft.points, draft.faces[groups[outer]])
+            if np.all(np.abs(solid.winding_numbers(points)) > 0.5):
                 nested.append(i)
     return nested
 

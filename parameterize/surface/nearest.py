@@ -5,11 +5,12 @@ import numpy as np
 
 from ..arrays import Array, IntArray
 from .geometry import normals_and_areas
+from .solid import Solid
 
 
 def distance_to_mesh(points: Array, vertices: Array, faces: IntArray) -> Array:
     """Return the distance of each point (m, 3) to the nearest point of a triangle mesh: (m,)."""
-    return closest_triangles(points, vertices, faces)[0]
+    return Solid(vertices, faces).depths(points)
 
 
 def nearest_on_mesh(points: Array, vertices: Array, faces: IntArray) -> tuple[Array, Array]:

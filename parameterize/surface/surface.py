@@ -22,13 +22,14 @@ from .errors import (
     without_unused_defects,
 )
 from .features import SHARP, Features, features_of
-from .geometry import deepest_point, signed_volume
+from .geometry import signed_volume
 from .groups import Groups, checked, renumbered
 from .holes import Close
 from .mending import Asked, mend, without_defects
 from .part import PartSurface
 from .readers.file import RawMesh, read_mesh
 from .readers.objects import READERS, class_of, read_object
+from .solid import Solid
 from .solids import distinct_solids, one_solid
 
 if TYPE_CHECKING:
@@ -343,7 +344,7 @@ def _gate(raw: RawMesh, name: str, source: str, asked: Asked) -> Surface:
     crossings = topology.crossing_faces(points, triangles)
     if len(crossings):
         doubts.append(topology.describe_crossings(draft.vertices, triangles, crossings))
-    deepest, _ = deepest_point(points, triangles)
+    deepest, _ = Solid(points, triangles).deepest()
     unit_scale = signed_volume(points, triangles) ** (-1.0 / 3.0)
     placed = unit_scale * (points - deepest) + 0.5
     return Surface(

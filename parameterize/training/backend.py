@@ -1,22 +1,42 @@
-"""Chooses the device, the precision and the threads of torch."""
+"""Chooses the device, the precision and the threads of torch, which is loaded only where it is asked."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from ctypes import CDLL
+from pathlib import Path
 from typing import Any
 
-import torch
-
-PRECISIONS = {"float32": torch.float32, "float64": torch.float64}
+PRECISIONS = "float32", "float64"
+_DRIVERS = "libcuda.so.1", "nvcuda.dll"  # of NVIDIA, on Linux and on Windows
+_ROCM = Path("/dev/kfd")  # of AMD, which torch names cuda, too
 
 
 def choose_device(name: str) -> str:
     """Return the device, "cpu" or "cuda", for "auto", "cpu" or "cuda". Raises ValueError where it is absent."""
     if name not in ("auto", "cpu", "cuda"):
         raise ValueError(f"device {name!r}: choose auto, cpu or cuda")
-    available = torch.cuda.is_available()
+    available = name != "cpu" and _has_device()
     if name == "cuda" and not available:
         raise ValueError("device cuda: torch finds no CUDA device here; use --device cpu")
-    return "cuda" if available and name != "cpu" else "cpu"
+    return "cuda" if available else "cpu"
+
+
+def _has_device() -> bool:
+    """Return whether torch finds a CUDA device; without a driver torch, which takes a second, is not loaded."""
+    if not _ROCM.exists() and not any(_loads(driver) for driver in _DRIVERS):
+        return False
+    import torch
+
+    return torch.cuda.is_available()
+
+
+def _loads(library: str) -> bool:
+    """Return whether a shared library is there."""
+    try:
+        CDLL(library)
+    except OSError:
+        return False
+    return True
 
 
 def choose_precision(dtype: Any) -> str:
@@ -35,6 +55,8 @@ def one_thread_an_operation() -> Iterator[None]:
     `in_parallel` takes torch's setting at its first operation and keeps it. All torch work in pieces needs this
     context: otherwise such a thread splits its sums, and the bits depend on which thread computes a piece.
     """
+    import torch
+
     threads = torch.get_num_threads()
     torch.set_num_threads(1)
     try:

@@ -21,11 +21,11 @@ from ..cube.edge_paths import PathError, choose_corners, cut_surface, edge_targe
 from ..cube.layout import CubeLayout
 from ..cube.turning import best_turn, hollowness
 from ..progress import History, Progress, ProgressCallback
-from .backend import PRECISIONS
+from ..surface.solid import Solid
 from .losses import BoundarySamples, EdgePaths, Objective
 from .network import InverseMap
 from .optimizer import TrainingOptimizer
-from .samples import TriangleSampler, interior_points, stencils
+from .samples import TriangleSampler, stencils
 from .stages import STAGES
 
 _log = logging.getLogger(__name__)
@@ -68,14 +68,14 @@ class Trainer:
         checkpoints: Checkpoints,
     ) -> None:
         self.config, self.seed = config, seed
-        self.device, self.dtype = torch.device(device), PRECISIONS[dtype]
+        self.device, self.dtype = torch.device(device), getattr(torch, dtype)
         self.vertices, self.faces, self.corners = vertices, faces, given_corners
         self.history, self.progress, self.checkpoints = history, progress, checkpoints
         self.generator = torch.Generator()
         first_weights = torch.Generator().manual_seed(seed % 2**63)
         self.network = InverseMap(config.network, first_weights).to(device=self.device, dtype=self.dtype)
         if config.train.whiten:
-            first = start_map(interior_points(vertices, faces, config.train.cell))
+            first = start_map(Solid(vertices, faces).lattice(config.train.cell))
             self.network.affine.copy_(self._tensor(first))
         inside = stencils(vertices, faces, config.train.cell, device=self.device, dtype=self.dtype)
         self.objective = Objective(self.network, inside)
