@@ -7,8 +7,8 @@ a stack of extrusions from columns.
 import logging
 import math
 
-from .blocks.layout import LayoutError
 from .checkpoint import Checkpoints
+from .layouts.rods.along_skeleton import LayoutError
 from .starts.blocks import BLOCKS
 from .starts.body import BODY
 from .starts.columns import COLUMNS

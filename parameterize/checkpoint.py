@@ -17,7 +17,7 @@ from safetensors.numpy import save as to_bytes
 
 from .files import save_bytes
 
-FORMAT = 9  # a file of another one is refused by name
+FORMAT = 10  # a file of another one is refused by name
 KEPT = {  # the checkpoints of a run by their names, in the order of its stages, and what they hold
     "choice": "the choice of blocks",
     "first": "the blocks that are laid",

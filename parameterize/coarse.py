@@ -10,11 +10,11 @@ from typing import Any
 from .arrays import Knots
 from .checkpoint import Checkpoints
 from .config import SplineConfig
+from .optimization.certified_map import CertifiedMap
 from .optimization.endings import Course
-from .optimization.optimized import Optimized
 from .optimization.phases import PATIENT_ROUNDS, Schedule
 from .optimization.rounds import optimize
-from .optimization.surface_distance import SurfaceFit
+from .optimization.surface_distance import Correspondence
 from .optimization.term import Weights
 from .progress import History, ProgressCallback
 from .spline.bspline import open_uniform_knots
@@ -29,7 +29,7 @@ def coarse_knots(config: SplineConfig, share: float) -> Knots:
 
 def optimize_coarse_first(
     start: SplineMap,
-    fit: SurfaceFit,
+    fit: Correspondence,
     config: SplineConfig,
     schedule: Schedule,
     weights: Weights,
@@ -37,7 +37,7 @@ def optimize_coarse_first(
     history: History,
     progress: ProgressCallback,
     checkpoints: Checkpoints,
-) -> tuple[Optimized, Course, SurfaceFit]:
+) -> tuple[CertifiedMap, Course, Correspondence]:
     """Run the first phase on the knots of `start` and `fit`, the others on all; return map, course and data there.
 
     start: on `coarse_knots`. The first rounds have a checkpoint of their own. Where both sets of

@@ -16,22 +16,22 @@ from .arrays import Array, IntArray, Knots
 from .certificate.determinant import DeterminantForm
 from .checkpoint import Checkpoints
 from .config import RefinementConfig, SplineConfig
+from .optimization.certified_map import CertifiedMap
 from .optimization.determinant_penalty import MIN_COEFFICIENT
 from .optimization.distortion import ARAP_LIMIT
 from .optimization.endings import Course
-from .optimization.optimized import Optimized
 from .optimization.phases import FIRM_ROUNDS, Polish, Schedule, Separate, Unfold
 from .optimization.rounds import optimize
 from .optimization.spans import in_blocks
-from .optimization.surface_distance import SurfaceFit
+from .optimization.surface_distance import Correspondence
 from .optimization.term import Weights
 from .progress import History, ProgressCallback
 from .quality.distortion import arap_grid, own_boxes
 from .quality.two_sided import two_sided
 from .spline.body import shared_numbers
 from .spline.bspline import breakpoints, midpoints
+from .spline.control_nets import ControlNets
 from .spline.directions import tied_spans
-from .spline.nets import Nets
 from .spline.spline_map import SplineMap
 from .spline.volume import AXES
 
@@ -90,8 +90,8 @@ class Refinement:
 
 
 def refine(
-    found: Optimized,
-    fit: SurfaceFit,
+    found: CertifiedMap,
+    fit: Correspondence,
     config: SplineConfig,
     refinement: RefinementConfig,
     weights: Weights,
@@ -99,7 +99,7 @@ def refine(
     history: History,
     progress: ProgressCallback,
     checkpoints: Checkpoints,
-) -> tuple[Optimized, SurfaceFit, Refinement]:
+) -> tuple[CertifiedMap, Correspondence, Refinement]:
     """Return the last map of which no less is proved than of `found`, its surface data, and how it was found.
 
     Each refinement has checkpoints of its own: the chosen knots, and those of its spline stage.
@@ -114,7 +114,7 @@ def refine(
             break
         kept = checkpoints.of_part(f"refined{number}")
         finer = _chosen_knots(spots, refinement.max_control_points, narrowest, kept)
-        if Nets(config.degree, finer).shapes == found.spline.nets.shapes:
+        if ControlNets(config.degree, finer).shapes == found.spline.nets.shapes:
             stopped = "limit reached"
             break
         other, surface, course = _optimized_on(finer, found.spline, fit, config, weights, kept, report)
@@ -145,7 +145,7 @@ class _Spots:
     level: Level
 
     @classmethod
-    def of(cls, found: Optimized, fit: SurfaceFit, course: Course | None = None) -> "_Spots":
+    def of(cls, found: CertifiedMap, fit: Correspondence, course: Course | None = None) -> "_Spots":
         """Measure a map as the report does; course: of the rounds on its knots."""
         spline, nets = found.spline, found.spline.nets
         gaps = two_sided(spline.body, fit.points, fit.places.triangles)
@@ -213,7 +213,7 @@ def _chosen_knots(spots: _Spots, most: int, narrowest: Array, checkpoints: Check
     return finer
 
 
-def halved_where_most(nets: Nets, amounts: list[Array], most: int, narrowest: Array) -> tuple[Knots, ...]:
+def halved_where_most(nets: ControlNets, amounts: list[Array], most: int, narrowest: Array) -> tuple[Knots, ...]:
     """Return the knots with those spans halved on which most is found, the largest amounts of all directions first.
 
     Spans that interfaces make one count together, and are halved together. amounts: of each span, a direction, block
@@ -250,12 +250,12 @@ def _control_points(counts: IntArray) -> int:
 def _optimized_on(
     finer: tuple[Knots, ...],
     spline: SplineMap,
-    fit: SurfaceFit,
+    fit: Correspondence,
     config: SplineConfig,
     weights: Weights,
     checkpoints: Checkpoints,
     report: dict[str, Any],
-) -> tuple[Optimized, SurfaceFit, Course]:
+) -> tuple[CertifiedMap, Correspondence, Course]:
     """Insert the knots and continue with the rounds that follow those of a certified map; return their course, too."""
     phases = (Unfold(), Separate(), Polish(rounds=POLISH))
     schedule = Schedule(phases, FIRM_ROUNDS + ROUNDS, gain=_GAIN)

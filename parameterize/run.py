@@ -12,17 +12,16 @@ from numpy.typing import ArrayLike, NDArray
 
 from .arrays import IntArray, in_brackets
 from .attempts import attempts
-from .carrying import carried
 from .certificate.body import Certificate, certify
 from .certificate.boundary import check_boundary
 from .checkpoint import Checkpoints
 from .config import Config, preset
 from .cube.boundary_map import BoundaryMap, boundary_map
-from .cube.layout import CubeLayout
+from .cube.cube_layout import CubeLayout
 from .display import Brief
-from .optimization.optimized import Optimized
+from .optimization.certified_map import CertifiedMap
 from .optimization.reassignment import reassign
-from .optimization.surface_distance import SurfaceFit
+from .optimization.surface_distance import Correspondence
 from .progress import History, ProgressCallback, ignore, timed
 from .quality.quality import QualityReport, measure
 from .refinement import Refinement, refine
@@ -31,6 +30,7 @@ from .starts.start import Origin, Task
 from .starts.tried import AttemptReport, best_of
 from .surface.surface import Surface
 from .training.backend import choose_device, choose_precision
+from .transfer import transferred
 
 MadeCallback = Callable[[BodyLike, dict[str, NDArray[Any]]], None]
 _LAST_SLIDES = 20  # of the boundary parameters before the boundary map is made, and again after `_LAST_SWEEPS`
@@ -191,7 +191,7 @@ def parameterize(
     with timed(seconds, "optimize"):
         body, boundary = _in_users_units(found, fit, task)
         if copy is not surface:
-            boundary = carried(boundary, body, surface)
+            boundary = transferred(boundary, body, surface)
     steps = history.arrays()
     if when_made is not None:
         when_made(body.simplest, steps)
@@ -293,7 +293,7 @@ def corner_vertices(surface: Surface, corners: ArrayLike) -> IntArray:
     return np.asarray(numbers, dtype=np.int64)
 
 
-def _in_users_units(found: Optimized, fit: SurfaceFit, task: Task) -> tuple[Body, BoundaryMap]:
+def _in_users_units(found: CertifiedMap, fit: Correspondence, task: Task) -> tuple[Body, BoundaryMap]:
     """Return the map and its boundary map; parameters are first brought close to this map's closest points."""
     surface, spline = task.surface, found.spline
     if not spline.nets.is_single:

@@ -9,7 +9,7 @@ from small_run import small_surface, tiny_config
 
 from parameterize import attempts
 from parameterize.attempts import BLOCKS, GROWTH, LAST, NETWORK, SHARP, STARTS, STIFF, next_start, starts_of
-from parameterize.blocks.layout import LayoutError
+from parameterize.layouts.rods.along_skeleton import LayoutError
 from parameterize.optimization.endings import Course, Reason
 from parameterize.run import parameterize
 from parameterize.starts.start import Attempt, Start

@@ -4,8 +4,8 @@ from scipy.spatial import ConvexHull
 from shapes import ball, rounded_cube, turned
 
 from parameterize.cube.cube import CORNERS, EDGES
+from parameterize.cube.cube_layout import CubeLayout
 from parameterize.cube.edge_paths import PathError, choose_corners, cut_surface, edge_targets
-from parameterize.cube.layout import CubeLayout
 
 
 def near_cube(seed, power=8.0, noise=0.005):

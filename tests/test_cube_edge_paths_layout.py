@@ -3,9 +3,9 @@ import pytest
 from shapes import rounded_cube, turned
 
 from parameterize.cube.cube import CORNERS, snap
+from parameterize.cube.cube_layout import CubeLayout
 from parameterize.cube.edge_paths import PathError, choose_corners, lay_out
 from parameterize.cube.flips import flipped
-from parameterize.cube.layout import CubeLayout
 
 
 def crumpled(noise, seed=0):

@@ -8,8 +8,8 @@ from scipy.spatial.transform import Rotation
 from shapes import ball, rounded_cube
 
 from parameterize.cube.cube import project_radially
-from parameterize.cube.layout import CubeLayout
-from parameterize.cube.turning import _HOLLOW, _OTHER_TURN, _angle_between, _bends, _hollowness, best_turn
+from parameterize.cube.cube_layout import CubeLayout
+from parameterize.cube.turning import _HOLLOW, _OTHER_TURN, _angle_between, _bends, _concavity, best_turn
 
 
 def laid(vertices, faces):
@@ -36,9 +36,9 @@ def test_the_edges_of_a_cube_are_found_again():
     layout = laid(points, faces)
     found = turned(layout, 0)
     middles, along, bends = _bends(layout)
-    best = _hollowness(middles, along, bends)
+    best = _concavity(middles, along, bends)
     middles, along, bends = _bends(found)
-    assert _hollowness(middles, along, bends) == pytest.approx(best, rel=0.01) and best < 0.0
+    assert _concavity(middles, along, bends) == pytest.approx(best, rel=0.01) and best < 0.0
     ridge = np.sort(np.abs(points - 0.5), axis=1)[:, 1] > 0.47  # on the edges of the rounded cube
     place = np.sort(np.abs(project_radially(found.places[ridge])), axis=1)[:, 1]
     assert np.median(place) > 0.47
@@ -48,7 +48,7 @@ def test_ridges_do_not_make_up_for_a_hollow_on_the_same_edge():
     """Of two layouts with the same sum of bends, that one is better whose edges lie in no hollow."""
     middles = np.array([[-0.5, -0.5, -0.4], [-0.5, -0.5, 0.4]])  # both on one edge of the cube, far apart
     along = np.array([[0.0, 0.0, 1.0]] * 2)
-    even, uneven = (_hollowness(middles, along, np.array(bends)) for bends in ([-1.0, -1.0], [1.0, -3.0]))
+    even, uneven = (_concavity(middles, along, np.array(bends)) for bends in ([-1.0, -1.0], [1.0, -3.0]))
     assert even == pytest.approx(-2.0, rel=1e-6)
     assert uneven == pytest.approx(-2.0 + _HOLLOW, rel=1e-6)
 
@@ -67,7 +67,7 @@ def test_a_higher_number_gives_another_turn_that_is_no_better():
     middles, along, bends = _bends(layout)
     found = [turned(layout, 1, number).places for number in (0, 1, 100)]
     turns = [Rotation.align_vectors(directions, layout.places)[0] for directions in found]
-    costs = [_hollowness(middles @ turn.as_matrix().T, along @ turn.as_matrix().T, bends) for turn in turns]
+    costs = [_concavity(middles @ turn.as_matrix().T, along @ turn.as_matrix().T, bends) for turn in turns]
     assert _angle_between(turns[1], turns[0]) > _OTHER_TURN
     assert costs[0] < costs[1] <= costs[2]
 

@@ -11,7 +11,7 @@ from small_run import tiny_config
 from parameterize import parameterize
 from parameterize.config import preset
 from parameterize.cube.flips import flipped
-from parameterize.optimization.optimized import Optimized
+from parameterize.optimization.certified_map import CertifiedMap
 from parameterize.optimization.term import Weights
 from parameterize.progress import History, Progress, ignore
 from parameterize.spline.bspline import open_uniform_knots
@@ -53,7 +53,7 @@ def test_the_first_map_is_a_cube_that_faces_the_surface():
     layout = on_cube(surface, preset("fast").with_control_points(8))
     knots = (open_uniform_knots(8, 3),) * 3
     cube = first_cube(layout, knots, 3)
-    found = Optimized.of(cube)
+    found = CertifiedMap.of(cube)
     assert found.certificate.verdict == "certified"
     assert found.certificate.lower_bound == pytest.approx(1.0)
     flat = cube.volume.control_points

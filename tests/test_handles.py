@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 from thick_bodies import BALL, eared, plate
 
-from parameterize.blocks.room import Room
 from parameterize.certificate.boundary import check_boundary
-from parameterize.handles.cutting import without_handles
-from parameterize.handles.layout import ACROSS, footprint, stub_layout
-from parameterize.handles.pieces import handles_of
-from parameterize.skeleton.solid import skeleton_of
+from parameterize.layouts.rods.clearance import Clearance
+from parameterize.layouts.skeleton.solid import skeleton_of
+from parameterize.layouts.stubs.cutting import without_handles
+from parameterize.layouts.stubs.pieces import handles_of
+from parameterize.layouts.stubs.stub_blocks import ACROSS, footprint, stub_layout
 from parameterize.spline.body import Body as SplineBody
 from parameterize.spline.volume import BSplineVolume
 from parameterize.surface.geometry import signed_volume
@@ -62,7 +62,7 @@ def test_stubs_are_glued_to_whole_faces_and_the_body_stays_as_it_is(body):
         right = handle.curve[:, 0].mean() > 0.0
         places = [np.array([[float(right), 0.5 + x[1], 0.5]]) for x in (handle.curve[0], handle.curve[-1])]
         ends.append(tuple(footprint(place, np.array([int(right)]), spans) for place in places))
-    layout, parts = stub_layout(volume, ends, handles, Room(skeleton, Solid(vertices, faces)))
+    layout, parts = stub_layout(volume, ends, handles, Clearance(skeleton, Solid(vertices, faces)))
     rods = layout.blocks[: len(layout.blocks) - len(parts)]
     assert len(rods) == 2 and all(rod.spans[:2] == (ACROSS, ACROSS) for rod in rods)
     glued = [face for one in layout.interfaces for face in (one.first, one.second)]

@@ -6,20 +6,20 @@ from shapes import ball
 from parameterize.cube.cube import CORNERS, EDGES, snap
 from parameterize.optimization.anchors import Anchors, edge_points, face_points
 from parameterize.optimization.sliding import SlidingParameters
-from parameterize.optimization.surface_distance import TANGENTIAL, SurfaceFit
+from parameterize.optimization.surface_distance import TANGENTIAL, Correspondence
 from parameterize.spline.bspline import greville, open_uniform_knots
+from parameterize.spline.control_nets import ControlNets
 from parameterize.spline.interface import Interface
-from parameterize.spline.nets import Nets
 from parameterize.spline.volume import FACE_NAMES
 from parameterize.surface.geometry import vertex_quadrics, vertex_weights
 
-NETS = Nets(3, ((open_uniform_knots(6, 3),) * 3,))  # three spans a direction
+NETS = ControlNets(3, ((open_uniform_knots(6, 3),) * 3,))  # three spans a direction
 
 
 def anchors_on_a_ball(radius=0.5, given_corners=None):
     points, faces = ball(2000)
     points = 0.5 + radius * points
-    fit = SurfaceFit(
+    fit = Correspondence(
         SlidingParameters(NETS, snap(points), triangles=faces),
         points,
         vertex_quadrics(points, faces, TANGENTIAL),

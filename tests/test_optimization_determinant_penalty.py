@@ -7,7 +7,7 @@ from bernstein import bernstein_coefficients
 from parameterize.optimization.determinant_penalty import DeterminantPenalty
 from parameterize.optimization.spans import in_blocks
 from parameterize.spline.bspline import greville, open_uniform_knots
-from parameterize.spline.nets import Nets
+from parameterize.spline.control_nets import ControlNets
 from parameterize.spline.spline_map import SplineMap
 from parameterize.spline.volume import BSplineVolume
 
@@ -18,7 +18,7 @@ def setting(degree, amplitude, seed=0, n=(6, 5, 7)):
     points = np.stack(np.meshgrid(*rows, indexing="ij"), axis=-1)
     points = points + amplitude * np.random.default_rng(seed).uniform(-1.0, 1.0, points.shape)
     return (
-        Nets(degree, (knots,)),
+        ControlNets(degree, (knots,)),
         np.moveaxis(points, -1, 0).reshape(3, -1),
         BSplineVolume((degree,) * 3, knots, points),
     )

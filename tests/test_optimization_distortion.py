@@ -6,7 +6,7 @@ from parameterize.optimization.determinant_penalty import DeterminantPenalty
 from parameterize.optimization.distortion import _MIN_DET, BlockDistortion, Distortion
 from parameterize.optimization.spans import in_blocks
 from parameterize.spline.bspline import greville, open_uniform_knots
-from parameterize.spline.nets import Nets
+from parameterize.spline.control_nets import ControlNets
 from parameterize.spline.volume import BSplineVolume
 
 
@@ -59,7 +59,7 @@ def test_less_det_is_asked_for_where_a_part_is_far_thinner():
 def test_floors_that_are_lowered_keep_the_gradient_true():
     control, knots = dumbbell()
     control = 0.7 * control + 0.01 * np.random.default_rng(0).normal(size=control.shape)
-    nets = Nets(3, (knots,))
+    nets = ControlNets(3, (knots,))
     control = control.reshape(3, -1)
     distortion, determinants = Distortion(nets, nets.knots), DeterminantPenalty(nets, nets.knots)
     distortion.terms[0].penalty = 1e3

@@ -2,16 +2,16 @@ import numpy as np
 import pytest
 import torch
 
-from parameterize.optimization.normals import FacingPenalty, facing_penalty
+from parameterize.optimization.normals import AlignmentPenalty, alignment_penalty
 from parameterize.optimization.operators import ControlRows
 from parameterize.optimization.sliding import SlidingParameters
-from parameterize.optimization.surface_distance import SurfaceFit
+from parameterize.optimization.surface_distance import Correspondence
 from parameterize.spline.bspline import greville, open_uniform_knots
-from parameterize.spline.nets import Nets
+from parameterize.spline.control_nets import ControlNets
 from parameterize.surface.geometry import vertex_normals
 
 FLOOR = 0.3
-NETS = Nets(3, ((open_uniform_knots(6, 3),) * 3,))
+NETS = ControlNets(3, ((open_uniform_knots(6, 3),) * 3,))
 
 
 def random_penalty(points=40, controls=50):
@@ -21,7 +21,7 @@ def random_penalty(points=40, controls=50):
     normals = rng.normal(size=(points, 3))
     weights = rng.uniform(0.5, 1.5, points)
     along_a, along_b = (ControlRows(indices, slope) for slope in slopes)
-    penalty = FacingPenalty((along_a, along_b), np.ascontiguousarray(normals.T), weights, FLOOR)
+    penalty = AlignmentPenalty((along_a, along_b), np.ascontiguousarray(normals.T), weights, FLOOR)
     control = rng.normal(size=(3, 5, 10, 1))
 
     def shortfall(x):
@@ -62,7 +62,7 @@ def box_fit(triangle_at):
         corners.extend(piece)
     points, faces = np.array(corners), np.array(faces)
     quadrics, weights = np.tile(np.eye(3), (18, 1, 1)), np.full(18, 1.0 / 18.0)
-    return SurfaceFit(SlidingParameters(NETS, points, triangles=faces), points, quadrics, weights), control
+    return Correspondence(SlidingParameters(NETS, points, triangles=faces), points, quadrics, weights), control
 
 
 @pytest.mark.parametrize("mirrored", [False, True])
@@ -70,7 +70,7 @@ def test_only_a_boundary_that_faces_the_other_way_is_penalised(mirrored):
     fit, control = box_fit(np.array([[0.2, 0.2], [0.7, 0.3], [0.4, 0.8]]))
     if mirrored:  # all faces now look into the solid, seen with the mesh's normals
         control[2] = 1.0 - control[2]
-    energy, _ = facing_penalty(fit, control, FLOOR).energy_and_gradient(control)
+    energy, _ = alignment_penalty(fit, control, FLOOR).energy_and_gradient(control)
     # a unit face has (t_a x t_b) . n = 1, mirrored -1 on the faces across the mirror's plane; n turns with the faces
     expected = (FLOOR + 1.0) ** 2 if mirrored else 0.0
     assert energy == pytest.approx(expected * (2.0 / 3.0 if mirrored else 1.0))

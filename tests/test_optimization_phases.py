@@ -7,19 +7,19 @@ import numpy as np
 import pytest
 from test_optimization_rounds import surface_fit
 
+from parameterize.optimization.certified_map import CertifiedMap
 from parameterize.optimization.endings import Course, Reason
 from parameterize.optimization.energy import SplineEnergy
-from parameterize.optimization.optimized import Optimized
 from parameterize.optimization.phases import Polish, Schedule, Separate, Shape, Unfold
 from parameterize.optimization.state import State
 from parameterize.optimization.term import Weights
 from parameterize.spline.bspline import greville, open_uniform_knots
-from parameterize.spline.nets import Nets
+from parameterize.spline.control_nets import ControlNets
 from parameterize.spline.spline_map import SplineMap
 from parameterize.starts.growth import Grow
 
 KNOTS = (open_uniform_knots(14, 3),) * 3
-NETS = Nets(3, (KNOTS,))
+NETS = ControlNets(3, (KNOTS,))
 
 
 def after(number, *, meets=False, yields=True, **given):
@@ -104,7 +104,7 @@ def cube():
 def state_of(control, fit=None, number=4):
     fit = (fit or surface_fit()).on_nets(NETS)
     places = fit.places.parameters, fit.places.cube_faces
-    best = Optimized.of(SplineMap.on_cube(3, KNOTS, control))
+    best = CertifiedMap.of(SplineMap.on_cube(3, KNOTS, control))
     state = State(SplineEnergy(NETS, fit, Weights()), best.spline, best, places, number=number, halved=2)
     state.best_square = fit.mean_square(best.spline.control)
     return state
@@ -116,32 +116,32 @@ def test_what_a_polish_folds_is_moved_back_there_and_nowhere_else():
     better[:, 2, 2, 2] += 0.4  # folds around the spans next to a corner
     state = state_of(start)
     fit = state.energy.surface
-    fit.give_way(np.full(len(fit.points), 0.8))
-    kept = Polish().amended(state, Optimized.of(SplineMap.on_cube(3, KNOTS, better)))
+    fit.relax(np.full(len(fit.points), 0.8))
+    kept = Polish().amended(state, CertifiedMap.of(SplineMap.on_cube(3, KNOTS, better)))
     assert kept.certificate.verdict == "certified"
     control = NETS.of_block(kept.spline.control, 0)
     moved_back, moved = (control == start).all(axis=0), (control == better).all(axis=0)
     assert moved_back[2, 2, 2] and moved[9:].all() and bool((moved_back | moved).all())
     near = (fit.places.parameters < 0.2).all(axis=1)
-    assert np.all(fit.yielding[near] == 0.2) and np.median(fit.yielding) == 0.8  # a quarter near the fold
+    assert np.all(fit.relaxation[near] == 0.2) and np.median(fit.relaxation) == 0.8  # a quarter near the fold
 
 
 def test_a_polish_gives_the_data_more_weight_unless_the_map_folds_again():
     state = state_of(cube())
     fit = state.energy.surface
-    fit.give_way(np.full(len(fit.points), 0.1))
+    fit.relax(np.full(len(fit.points), 0.1))
     Polish().begin(state)
-    assert np.all(fit.yielding == 0.4)
+    assert np.all(fit.relaxation == 0.4)
     state.spline = state.spline.with_control(1.001 * state.spline.control)
     Polish().begin(state)
-    assert np.all(fit.yielding == 0.4)
+    assert np.all(fit.relaxation == 0.4)
 
 
 @pytest.mark.parametrize(("number", "smooth"), [(3, False), (4, True)])
 def test_few_spans_that_stay_unproved_are_smoothed(number, smooth):
     folded = cube()
     folded[0, 6, 6, 6] += 0.33
-    found = Optimized.of(SplineMap.on_cube(3, KNOTS, folded))
+    found = CertifiedMap.of(SplineMap.on_cube(3, KNOTS, folded))
     assert 0 < len(found.unproved) <= 10
     amended = Unfold().amended(state_of(cube(), number=number), found)
     assert (amended.certificate.verdict == "certified") == smooth and (amended is found) != smooth
@@ -151,7 +151,7 @@ def test_many_spans_are_not_smoothed(monkeypatch):
     folded = cube()
     folded[0, 6, 6, 6] += 0.33
     monkeypatch.setattr("parameterize.optimization.phases._MOST_SMOOTHED", 0)
-    found = Optimized.of(SplineMap.on_cube(3, KNOTS, folded))
+    found = CertifiedMap.of(SplineMap.on_cube(3, KNOTS, folded))
     assert Unfold().amended(state_of(cube()), found) is found
 
 
@@ -160,13 +160,13 @@ def test_the_surface_gives_way_where_sheets_are_pushed_apart(monkeypatch):
     monkeypatch.setattr(SplineEnergy, "watch_contact", lambda *_: np.array([[0, 0, 5, 5]]))
     Separate().begin(state)
     fit = state.energy.surface
-    assert fit.yielding.min() == 0.0625 and np.median(fit.yielding) == 1.0
+    assert fit.relaxation.min() == 0.0625 and np.median(fit.relaxation) == 1.0
 
 
 def test_a_certified_map_counts_by_what_is_proved_of_its_boundary():
-    certified = Optimized.of(SplineMap.on_cube(3, KNOTS, cube())).certificate
+    certified = CertifiedMap.of(SplineMap.on_cube(3, KNOTS, cube())).certificate
     apart, undecided, meets = (
-        Optimized(SplineMap.on_cube(3, KNOTS, cube()), certified, injective) for injective in (True, None, False)
+        CertifiedMap(SplineMap.on_cube(3, KNOTS, cube()), certified, injective) for injective in (True, None, False)
     )
     assert apart.rank < undecided.rank < meets.rank
     assert apart.faults == undecided.faults < meets.faults

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from block_bodies import box, map_of, rod, sampled, straight_block, surface_fit
 
-from parameterize.blocks.layout import BlockLayout
+from parameterize.layouts.rods.along_skeleton import BlockLayout
 from parameterize.optimization.reassignment import reassign
 
 THICKNESS = 0.02

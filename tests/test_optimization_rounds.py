@@ -14,12 +14,12 @@ from parameterize.optimization.phases import RAMP, Polish, Schedule, Separate, S
 from parameterize.optimization.rounds import optimize
 from parameterize.optimization.sliding import SlidingParameters
 from parameterize.optimization.spans import in_blocks
-from parameterize.optimization.surface_distance import TANGENTIAL, SurfaceFit
+from parameterize.optimization.surface_distance import TANGENTIAL, Correspondence
 from parameterize.optimization.term import RoundWeights, Weights
 from parameterize.progress import History
 from parameterize.quality.distortion import arap
 from parameterize.spline.bspline import gauss_points, greville, open_uniform_knots
-from parameterize.spline.nets import Nets
+from parameterize.spline.control_nets import ControlNets
 from parameterize.spline.spline_map import SplineMap
 from parameterize.spline.volume import BSplineVolume
 from parameterize.surface.geometry import vertex_quadrics, vertex_weights
@@ -28,7 +28,7 @@ DESCEND = "parameterize.optimization.rounds.descend"
 CONFIG = SplineConfig(control_points=7, steps=5)
 SCHEDULE = Schedule((Shape(RAMP), Unfold(RAMP, far=1.0), Separate(RAMP), Polish(RAMP)), rounds=6)
 KNOTS = (open_uniform_knots(7, 3),) * 3
-NETS = Nets(3, (KNOTS,))
+NETS = ControlNets(3, (KNOTS,))
 ALL_SPANS = in_blocks([np.indices((4, 4, 4)).reshape(3, -1).T])
 
 
@@ -62,7 +62,7 @@ def surface_fit():
         vertex_weights(vertices, faces, len(vertices)),
     )
     places = SlidingParameters(NETS, 0.5 + project_radially(centred), triangles=faces)
-    return SurfaceFit(places, vertices, quadrics, weights)
+    return Correspondence(places, vertices, quadrics, weights)
 
 
 def penalised_energy():
@@ -165,7 +165,7 @@ def test_smoothing_bends_least_next_to_the_spans_and_moves_nothing_else():
     around = np.array([[0, 4, 4, 4]])
     folded = control.copy()
     folded[:, 6, 6, 6] += 0.4
-    nets = Nets(3, (knots,))
+    nets = ControlNets(3, (knots,))
     energy = SplineEnergy(nets, surface_fit().on_nets(nets), Weights())
     smoothed = energy.smoothed(folded.reshape(3, -1), around).reshape(folded.shape)
     assert np.allclose(smoothed, control, atol=1e-7)  # a cube bends nowhere
@@ -177,10 +177,10 @@ def test_smoothing_bends_least_next_to_the_spans_and_moves_nothing_else():
 
 def test_what_gave_way_counts_again_once_the_map_is_certified():
     start, fit = wavy_control(0.08), surface_fit()
-    fit.give_way(np.full(len(fit.points), 0.05))
+    fit.relax(np.full(len(fit.points), 0.05))
     found, course, _ = optimise_from(start, replace(SCHEDULE, rounds=10), fit=fit)
     assert found.certificate.verdict == "certified"
-    assert np.median(fit.yielding) == 1.0
+    assert np.median(fit.relaxation) == 1.0
     assert course.rounds["polish"] >= 3  # 0.05 times 4 a round
 
 
@@ -238,7 +238,7 @@ def test_what_was_certified_is_the_result_where_the_polish_folds_more(monkeypatc
     monkeypatch.setattr("parameterize.optimization.rounds.descend", fold_more)
     monkeypatch.setattr("parameterize.optimization.phases._MENDINGS", 0)
     fit = surface_fit()
-    fit.give_way(np.full(len(fit.points), 1e-6))  # so that the polish has something to take back
+    fit.relax(np.full(len(fit.points), 1e-6))  # so that the polish has something to take back
     found, course, _ = optimise_from(start, replace(SCHEDULE, rounds=12), fit=fit)
     assert found.certificate.verdict == "certified" and np.array_equal(found.spline.control, start.reshape(3, -1))
     assert course.ending is Reason.FOLDS_AGAIN and course.rounds == {"shape": 1, "polish": 2}

@@ -10,11 +10,11 @@ import pytest
 from block_bodies import map_of, surface_fit
 from block_starts import double_torus, torus
 
-from parameterize.blocks.layout import BlockLayout
 from parameterize.certificate.body import certify
 from parameterize.certificate.boundary import check_boundary
 from parameterize.checkpoint import Checkpoints
 from parameterize.config import SplineConfig
+from parameterize.layouts.rods.along_skeleton import BlockLayout
 from parameterize.optimization.energy import SplineEnergy
 from parameterize.optimization.phases import Polish, Schedule, Separate, Shape, Unfold
 from parameterize.optimization.rounds import optimize

@@ -5,7 +5,7 @@ from wavy import NETS, as_volume, on_the_cube, wavy_control
 
 from iga_nn.samples import sample
 from parameterize.optimization.sliding import SlidingParameters
-from parameterize.optimization.surface_distance import SurfaceFit
+from parameterize.optimization.surface_distance import Correspondence
 from parameterize.surface.geometry import vertex_quadrics, vertex_weights
 
 
@@ -17,7 +17,7 @@ def make_fit(points, parameters, tangential=0.02):
     weights = rng.uniform(0.5, 1.5, len(points))
     places = SlidingParameters(NETS, parameters, triangles=np.array([[0, 1, 2]]))
     weights /= weights.sum()
-    return SurfaceFit(places, points, quadrics, weights), quadrics * weights[:, None, None]
+    return Correspondence(places, points, quadrics, weights), quadrics * weights[:, None, None]
 
 
 def test_residuals_are_those_of_the_volume():

@@ -3,7 +3,7 @@ import pytest
 
 from parameterize.optimization.bending import bending_operator, grams
 from parameterize.optimization.operators import ControlRows
-from parameterize.optimization.tensor_product import FastDiagonalization, GaussGrid, along
+from parameterize.optimization.tensor_product import GaussGrid, KroneckerInverse, along
 from parameterize.spline.bspline import gauss_points, greville, open_uniform_knots
 from parameterize.spline.volume import BSplineVolume
 
@@ -113,7 +113,7 @@ def test_fast_diagonalization_is_the_inverse(shift):
     for e in ends:
         e[0, 0] = e[-1, -1] = 2.0
     rough = tuple(k + 0.1 * h + e for k, h, e in zip(slope, curve, ends, strict=True))
-    solve = FastDiagonalization(rough, mass, shift)
+    solve = KroneckerInverse(rough, mass, shift)
     x = random_field(7)
     m0, m1, m2 = mass
     image = shift * along(m2, along(m1, along(m0, x, 1), 2), 3)

@@ -9,18 +9,18 @@ from parameterize.checkpoint import Checkpoints
 from parameterize.config import RefinementConfig, SplineConfig
 from parameterize.cube.cube import project_radially
 from parameterize.cube.cutting import subdivide_finely
+from parameterize.optimization.certified_map import CertifiedMap
 from parameterize.optimization.endings import Course, Reason
-from parameterize.optimization.optimized import Optimized
 from parameterize.optimization.phases import FIRM_ROUNDS, RAMP, Polish, Schedule, Separate, Shape, Unfold
 from parameterize.optimization.rounds import optimize
 from parameterize.optimization.sliding import SlidingParameters
-from parameterize.optimization.surface_distance import TANGENTIAL, SurfaceFit
+from parameterize.optimization.surface_distance import TANGENTIAL, Correspondence
 from parameterize.optimization.term import Weights
 from parameterize.progress import History, ignore
 from parameterize.quality.two_sided import two_sided
 from parameterize.refinement import refine
 from parameterize.spline.bspline import greville, open_uniform_knots
-from parameterize.spline.nets import Nets
+from parameterize.spline.control_nets import ControlNets
 from parameterize.spline.spline_map import SplineMap
 from parameterize.surface.geometry import vertex_quadrics, vertex_weights
 
@@ -34,9 +34,9 @@ def surface_fit():
     """A rounded cube, slightly turned, whose parameters are the radial projection."""
     points, faces = subdivide_finely(*rounded_cube(OWN, power=4.0), CONFIG.longest_edge / 4.0, 9 * OWN)
     vertices = turned(points)
-    places = SlidingParameters(Nets(3, (KNOTS,)), 0.5 + project_radially(points - 0.5), triangles=faces)
+    places = SlidingParameters(ControlNets(3, (KNOTS,)), 0.5 + project_radially(points - 0.5), triangles=faces)
     quadrics = vertex_quadrics(vertices, faces, TANGENTIAL)
-    return SurfaceFit(places, vertices, quadrics, vertex_weights(vertices, faces, OWN))
+    return Correspondence(places, vertices, quadrics, vertex_weights(vertices, faces, OWN))
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -112,7 +112,7 @@ def test_the_last_certified_map_is_kept_where_a_finer_one_is_not(first, monkeypa
     def folded(start, *args, **options):
         pressed = start.control.copy()
         pressed[:, 0] += 0.5  # at a corner
-        return Optimized.of(start.with_control(pressed)), Course({}, {}, Reason.STALLED)
+        return CertifiedMap.of(start.with_control(pressed)), Course({}, {}, Reason.STALLED)
 
     monkeypatch.setattr(refinement, "optimize", folded)
     found, fit, told = refined(first, tolerance=1e-9)
@@ -127,7 +127,7 @@ def test_spans_that_are_not_proved_are_halved_first(first, monkeypatch):
     """A fold is pressed into one corner: what lies there is halved, and nothing else."""
     control, seen = first[0].spline.control.copy(), []
     control[:, 0] += 0.5  # at a corner
-    found = Optimized.of(first[0].spline.with_control(control))
+    found = CertifiedMap.of(first[0].spline.with_control(control))
     assert set(map(tuple, found.certificate.unproved)) == {(0, 0, 0)}
 
     def caught(start, *args, **options):
@@ -167,9 +167,9 @@ def test_knots_once_chosen_are_those_of_the_checkpoint(first, once, monkeypatch)
 
 def test_weights_that_gave_way_are_carried_over(first):
     fit = surface_fit()
-    fit.give_way(np.linspace(0.1, 1.0, len(fit.points)))
+    fit.relax(np.linspace(0.1, 1.0, len(fit.points)))
     finer = tuple(np.sort(np.append(row, 0.1)) for row in KNOTS)
-    other = fit.on_nets(Nets(3, (finer,)))
+    other = fit.on_nets(ControlNets(3, (finer,)))
     assert np.array_equal(other.yielding, fit.yielding) and np.array_equal(other.weights, fit.weights)
     assert np.array_equal(other.places.parameters, fit.places.parameters)
     assert other.places.knots == finer

@@ -4,8 +4,8 @@ import pytest
 from parameterize import refinement
 from parameterize.refinement import halved_where_most, totals_along
 from parameterize.spline.bspline import breakpoints, open_uniform_knots
+from parameterize.spline.control_nets import ControlNets
 from parameterize.spline.interface import Interface
-from parameterize.spline.nets import Nets
 
 KNOTS = tuple(open_uniform_knots(n, 3) for n in (7, 6, 5))  # 4, 3 and 2 spans
 COUNTS = (7, 6, 5)
@@ -18,7 +18,7 @@ def no_limits(monkeypatch):
 
 
 def halved(amounts, most=60, narrowest=0.0):
-    (found,) = halved_where_most(Nets(3, (KNOTS,)), amounts, most, np.full((1, 3), narrowest))
+    (found,) = halved_where_most(ControlNets(3, (KNOTS,)), amounts, most, np.full((1, 3), narrowest))
     return [np.setdiff1d(finer, row).tolist() for finer, row in zip(found, KNOTS, strict=True)]
 
 
@@ -63,7 +63,7 @@ def test_nothing_found_means_nothing_halved():
 def rods(*interfaces):
     """Two blocks of 3 x 2 x 4 and 2 x 3 x 1 spans; u of the one and v of the other are one along their interface."""
     counts = ((6, 5, 7), (5, 6, 4))
-    return Nets(3, tuple(tuple(open_uniform_knots(n, 3) for n in row) for row in counts), interfaces)
+    return ControlNets(3, tuple(tuple(open_uniform_knots(n, 3) for n in row) for row in counts), interfaces)
 
 
 def test_spans_of_glued_blocks_are_halved_together_and_count_together(monkeypatch):

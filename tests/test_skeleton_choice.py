@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from thick_bodies import plate, star
 
-from parameterize.skeleton.choice import choose
-from parameterize.skeleton.graph import Branch, Skeleton
-from parameterize.skeleton.solid import skeleton_of
+from parameterize.layouts.skeleton.choice import choose
+from parameterize.layouts.skeleton.graph import Branch, Skeleton
+from parameterize.layouts.skeleton.solid import skeleton_of
 
 AXES = np.concatenate([np.eye(3), -np.eye(3)])
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from parameterize.skeleton.contraction import MOST, contract, divide, drop_stubs
-from parameterize.skeleton.depth import Depth
-from parameterize.skeleton.web import Arc, Web
+from parameterize.layouts.skeleton.contraction import MOST, contract, divide, drop_stubs
+from parameterize.layouts.skeleton.depth import Depth
+from parameterize.layouts.skeleton.web import Arc, Web
 
 MIDDLE = np.full(3, 20.0)
 

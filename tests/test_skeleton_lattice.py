@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from thick_bodies import capsule, implicit, ring
 
-from parameterize.skeleton.lattice import lattices
+from parameterize.layouts.skeleton.lattice import lattices
 
 GAP = 0.03
 

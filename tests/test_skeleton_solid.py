@@ -9,8 +9,8 @@ import trimesh
 from scipy.spatial import cKDTree
 from thick_bodies import at_volume_one, capsule, implicit, plate, ring, star, union
 
-from parameterize.skeleton.graph import SkeletonError
-from parameterize.skeleton.solid import skeleton_of
+from parameterize.layouts.skeleton.graph import SkeletonError
+from parameterize.layouts.skeleton.solid import skeleton_of
 
 AXES = np.concatenate([np.eye(3), -np.eye(3)])
 
@@ -115,7 +115,7 @@ def test_a_knotted_tunnel_is_refused_in_words():
 
 def test_a_part_that_is_too_thin_is_named_with_its_place(monkeypatch):
     """A ring as thin as a wire on a ball, at a resolution that cannot hold it."""
-    monkeypatch.setattr("parameterize.skeleton.lattice.MOST_POINTS", 100_000)
+    monkeypatch.setattr("parameterize.layouts.skeleton.lattice.MOST_POINTS", 100_000)
     vertices, faces, genus = implicit(
         lambda x: np.minimum(np.linalg.norm(x, axis=0) - 1.0, ring(x, 1.0, 0.8, 0.02)), (2.0, 1.1, 1.1), 200
     )

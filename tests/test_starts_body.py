@@ -10,8 +10,8 @@ from thick_bodies import eared
 import parameterize.starts.body as starts
 from parameterize.checkpoint import Checkpoints
 from parameterize.config import preset
+from parameterize.optimization.certified_map import CertifiedMap
 from parameterize.optimization.endings import Course, Reason
-from parameterize.optimization.optimized import Optimized
 from parameterize.optimization.term import Weights
 from parameterize.progress import History, ignore
 from parameterize.spline.spline_map import SplineMap
@@ -24,7 +24,7 @@ NOTHING_KEPT = Checkpoints(None, {}, resume=False)
 
 
 def attempt(spline, rounds, seconds):
-    return Attempt(Optimized.of(spline), Course(Counter(rounds), seconds, Reason.STALLED), None, Weights())
+    return Attempt(CertifiedMap.of(spline), Course(Counter(rounds), seconds, Reason.STALLED), None, Weights())
 
 
 class Cube:

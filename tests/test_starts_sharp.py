@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from shapes import rounded_cube
-from test_cube_carried import drum
+from test_cube_constrained import drum
 
 from parameterize.config import preset
 from parameterize.progress import History, ignore

@@ -9,7 +9,7 @@ from shapes import rounded_cube
 
 from parameterize.attempts import BLOCKS, BODY, STARTS, starts_of
 from parameterize.config import preset
-from parameterize.skeleton.choice import Choice
+from parameterize.layouts.skeleton.choice import Choice
 from parameterize.starts import start
 from parameterize.starts.start import Task, spans_across
 from parameterize.surface.surface import surface_from_arrays

@@ -11,8 +11,8 @@ from shapes import ball
 from small_run import STEPS, small_surface, tiny_config
 
 from parameterize.config import NetworkConfig
-from parameterize.cube.layout import CubeLayout
-from parameterize.cube.turning import best_turn, hollowness
+from parameterize.cube.cube_layout import CubeLayout
+from parameterize.cube.turning import best_turn, concavity
 from parameterize.run import parameterize
 from parameterize.training import trainer
 from parameterize.training.network import InverseMap
@@ -47,7 +47,7 @@ class Seen:
 @pytest.fixture
 def turns_are_promising(monkeypatch):
     scores = iter([-1.0, -100.0] * 4)
-    monkeypatch.setattr(trainer, "hollowness", lambda *_: next(scores))
+    monkeypatch.setattr(trainer, "concavity", lambda *_: next(scores))
     monkeypatch.setattr(trainer, "best_turn", lambda *_: QUARTER)
 
 
@@ -67,7 +67,7 @@ def test_the_best_turn_makes_the_hollowness_least():
     points = points * (1.0 + 0.3 * np.sin(5.0 * points[:, :1]) * points[:, 1:2])
     layout = CubeLayout(points, faces, points / np.linalg.norm(points, axis=1, keepdims=True), len(points))
     turn = best_turn(layout, np.random.default_rng(0))
-    assert hollowness(replace(layout, places=layout.places @ turn.T)) < hollowness(layout)
+    assert concavity(replace(layout, places=layout.places @ turn.T)) < concavity(layout)
 
 
 @pytest.mark.usefixtures("turns_are_promising")
@@ -92,7 +92,7 @@ def test_a_turn_that_wins_goes_on(monkeypatch):
 
 
 def test_no_turn_is_tried_where_the_edges_lie_well_already(monkeypatch):
-    monkeypatch.setattr(trainer, "hollowness", lambda *_: -1.0)
+    monkeypatch.setattr(trainer, "concavity", lambda *_: -1.0)
     seen = Seen()
     run(progress=seen)
     assert seen.count("cube", 1) == 1

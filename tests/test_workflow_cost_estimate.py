@@ -20,8 +20,8 @@ from iga_nn.cli.commands import main
 from iga_nn.report import document as report
 from iga_nn.workflow.cost_estimate import TRAINING_STEP, Forecast, available_memory_mb, forecast
 from parameterize.config import preset
-from parameterize.polyhedra import layout
-from parameterize.polyhedra.prisms import columns
+from parameterize.layouts.planes import exact_blocks as layout
+from parameterize.layouts.planes.prisms import columns
 from parameterize.surface.surface import surface_from_arrays
 
 CPU = "cpu"

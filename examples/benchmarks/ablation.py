@@ -33,8 +33,8 @@ from iga_nn.options import MapOptions, WorkerOptions
 from iga_nn.report import document as reports
 from iga_nn.workflow.worker_run import Ended
 from parameterize import attempts, config
-from parameterize.blocks import layout
 from parameterize.files import save_text
+from parameterize.layouts.rods import along_skeleton as layout
 from parameterize.optimization import anchors, phases, rounds
 from parameterize.optimization.acceleration import Acceleration
 from parameterize.optimization.anchors import Anchors
@@ -193,7 +193,7 @@ PARTS: dict[str, Part] = {
     "stiffening": Part("more weight of unproved spans, round by round", put(rounds, _SPAN_MOST=1.0), UNFOLDING),
     "giving way": Part(
         "less weight of the surface at unproved spans",
-        together(put(phases, GIVING_WAY=1.0, _CONTACT_WAY=1.0), put(rounds, GIVING_WAY=1.0)),
+        together(put(phases, RELAXING=1.0, _CONTACT_WAY=1.0), put(rounds, RELAXING=1.0)),
         UNFOLDING,
     ),
     "smoothing": Part("smoothing near a few unproved spans", put(phases, _MOST_SMOOTHED=0), UNFOLDING),
@@ -203,7 +203,7 @@ PARTS: dict[str, Part] = {
     "drawn edges": Part(
         "anchors that draw edges to the surface", put(Anchors, aim=lambda own, _: own.release()), POLISHING
     ),
-    "facing": Part("the penalty on normals that do not agree", put(SplineEnergy, watch_facing=lambda *_: None)),
+    "facing": Part("the penalty on normals that do not agree", put(SplineEnergy, watch_alignment=lambda *_: None)),
     "relaxing": Part("untangling of the layout after each step", put(SlidingParameters, relax=lambda *_: None)),
     "Anderson": Part("Anderson's guess at the limit of the steps", put(Acceleration, guess=lambda _: None)),
 }

@@ -28,11 +28,11 @@ def show_inside(panels: Any, body: BodyLike, points: Samples, patches: Sequence[
             show_section(panel, title, patch.points, patch.colors)
         return
     for panel, name, towards in zip(panels, "xyz", np.eye(3), strict=True):
-        panel.imshow(draw(visible(body, patches, beyond(points, towards)), _facing(towards), PANEL))
+        panel.imshow(draw(visible(body, patches, beyond(points, towards)), _alignment(towards), PANEL))
         panel.set_title(f"cut across {name}", fontsize=13)
 
 
-def _facing(direction: Array) -> View:
+def _alignment(direction: Array) -> View:
     """Return the view of a viewer who looks against an axis of space, a little from above and aside."""
     up = np.array([0.0, 1.0, 0.0]) if direction[2] else np.array([0.0, 0.0, 1.0])
     towards = direction + UP * up + ASIDE * np.cross(up, direction)

@@ -99,7 +99,7 @@ def forecast(
     corners: those are of one cube that is trained, also where planes bound the body. A second start, where the first
     map is not certified, takes the same time again. Exact blocks are neither trained nor optimised.
     """
-    from parameterize.polyhedra.layout import division_of
+    from parameterize.layouts.planes.exact_blocks import division_of
     from parameterize.training.backend import one_thread_an_operation
     from parameterize.training.effort import points_of_a_step
 
@@ -138,8 +138,8 @@ def _other_way(surface: Surface, config: Config, corners: bool) -> str:
 
     Only what takes a second is looked at: which limbs a long body has, for one, takes longer.
     """
-    from parameterize.columns.stack import stack_of
-    from parameterize.columns.tapers import tapered_stack_of
+    from parameterize.layouts.stacks.stack import stack_of
+    from parameterize.layouts.stacks.tapers import tapered_stack_of
     from parameterize.starts.start import COMPACT, Task
 
     if surface.genus or (config.blocks or 1) > 1:

@@ -283,11 +283,11 @@ def _train(
 
     made: `when_made` of `parameterize`.
     """
-    from parameterize.blocks.layout import LayoutError
     from parameterize.checkpoint import CheckpointError
     from parameterize.cube.edge_paths import PathError
+    from parameterize.layouts.rods.along_skeleton import LayoutError
+    from parameterize.layouts.skeleton.graph import SkeletonError
     from parameterize.run import parameterize
-    from parameterize.skeleton.graph import SkeletonError
 
     try:
         return parameterize(

@@ -18,9 +18,9 @@ from ..spline.volume import FACE_NAMES, BSplineVolume
 from ..surface.groups import Groups, as_arrays, checked, from_arrays
 from ..surface.part import PartSurface
 from .cube import damped_fit, snap
+from .cube_layout import CubeLayout
 from .cutting import CutMesh, cut_along_rays
 from .flips import orientation, untangle_whole
-from .layout import CubeLayout
 
 PART = ("part_faces", "group_names", "group_sizes", "group_faces")  # arrays of boundary.npz that older files lack
 PATCHES = "patches"  # another one

@@ -22,8 +22,8 @@ from ..arrays import Array, IntArray, Mask
 from ..checkpoint import Checkpoints
 from ..progress import Progress, ProgressCallback, ignore
 from ..surface.geometry import edge_table, normals_and_areas
+from .cube_layout import CubeLayout
 from .cutting import split_edges
-from .layout import CubeLayout
 
 _Weigh = Callable[[Array, Array, Mask], Array]
 

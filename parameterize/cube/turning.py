@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 from ..arrays import Array
 from ..surface.geometry import edge_triangles, normals_and_areas
 from ..threads import in_parallel
-from .layout import CubeLayout
+from .cube_layout import CubeLayout
 
 _TURNS = 200  # rotations of the cube that are drawn at random
 _FINALISTS = 5  # the best of these, which are turned further
@@ -25,7 +25,7 @@ _HOLLOW = 1.0  # extra weight of a piece in a hollow
 
 
 def best_turn(layout: CubeLayout, generator: np.random.Generator, number: int = 0) -> Array:
-    """Return the rotation (3, 3) of a layout on the sphere with the least hollowness along the cube's edges.
+    """Return the rotation (3, 3) of a layout on the sphere with the least concavity along the cube's edges.
 
     number: 0 for the best rotation, 1 for the next best, and so on. The best of some random rotations are improved by
     the simplex method of Nelder and Mead; results that nearly agree count as one. Where fewer than `number` + 1 results
@@ -36,7 +36,7 @@ def best_turn(layout: CubeLayout, generator: np.random.Generator, number: int = 
 
     def cost(rotation: Rotation) -> float:
         turn = rotation.as_matrix().T
-        return _hollowness(middles @ turn, along @ turn, bends)
+        return _concavity(middles @ turn, along @ turn, bends)
 
     def turned_further(rotation: Rotation) -> tuple[float, Rotation]:
         def cost_after(vector: Array) -> float:
@@ -62,9 +62,9 @@ def best_turn(layout: CubeLayout, generator: np.random.Generator, number: int = 
     return np.asarray(turns[min(number, len(turns) - 1)].as_matrix())
 
 
-def hollowness(layout: CubeLayout) -> float:
-    """Return the hollowness of a layout along the cube's edges, which `best_turn` minimises; ridges are negative."""
-    return _hollowness(*_bends(layout))
+def concavity(layout: CubeLayout) -> float:
+    """Return the concavity of a layout along the cube's edges, which `best_turn` minimises; ridges are negative."""
+    return _concavity(*_bends(layout))
 
 
 def _is_other(rotation: Rotation, turns: list[Rotation]) -> bool:
@@ -94,7 +94,7 @@ def _bends(layout: CubeLayout) -> tuple[Array, Array, Array]:
     return middles, step / np.maximum(length, 1e-300)[:, None], length * hollow
 
 
-def _hollowness(middles: Array, along: Array, bends: Array) -> float:
+def _concavity(middles: Array, along: Array, bends: Array) -> float:
     """Return the sum of the bends (e,) near the cube's edges, weighted by nearness and direction.
 
     The bends are summed over pieces of each cube edge; a positive sum, a hollow, has a larger weight.

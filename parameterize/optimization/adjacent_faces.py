@@ -9,14 +9,14 @@ from functools import lru_cache
 import numpy as np
 
 from ..arrays import Array, IntArray
+from ..spline.control_nets import ControlNets
 from ..spline.interface import Interface, axis_side, varying
-from ..spline.nets import Nets
 
 Edges = tuple[IntArray, Array]  # the table of `next_faces`, and the side lengths (blocks, 3) of the blocks
 
 
 @lru_cache(maxsize=4)
-def next_faces(nets: Nets) -> IntArray:
+def next_faces(nets: ControlNets) -> IntArray:
     """Return a table (6 blocks, 3, 2, 4) of what lies beyond the edge of a face, at the side 0 or 1 of a direction.
 
     An entry holds the number of the next face, the direction and the side of the edge on that face, and whether the two
@@ -36,7 +36,11 @@ def next_faces(nets: Nets) -> IntArray:
 
 
 def _beyond(
-    face: int, direction: int, side: int, nets: Nets, crossings: dict[tuple[int, int, int], tuple[int, int, int, int]]
+    face: int,
+    direction: int,
+    side: int,
+    nets: ControlNets,
+    crossings: dict[tuple[int, int, int], tuple[int, int, int, int]],
 ) -> tuple[int, int, int, int]:
     """Return an entry of the table: walk around the edge, from face to face, until one belongs to the boundary."""
     reverse = 0

@@ -20,11 +20,11 @@ import numpy as np
 from ..arrays import Array, IntArray
 from ..cube.cube import CORNERS, EDGES, face_number
 from ..spline.bspline import divided_spans
-from ..spline.nets import Nets
+from ..spline.control_nets import ControlNets
 from ..surface.nearest import nearest_on_mesh
 from .operators import PiecewiseOperator
 from .sliding import SlidingParameters
-from .surface_distance import TANGENTIAL, SurfaceFit
+from .surface_distance import TANGENTIAL, Correspondence
 from .term import RoundWeights
 
 _A_SPAN = 2
@@ -33,7 +33,7 @@ _FACES = 0.1  # the same of anchors on edges and faces, which are more
 _GIVEN_CORNER = 0.5  # weight, in all directions, of a corner that the user gives
 
 
-def edge_points(nets: Nets) -> tuple[Array, IntArray]:
+def edge_points(nets: ControlNets) -> tuple[Array, IntArray]:
     """Return points (k, 3) on the edges of all faces that belong to the boundary, and these faces (k,).
 
     The points are the corners, and the ends and the midpoints of the spans along the edges, once for each block.
@@ -58,7 +58,7 @@ def _faces_at(first: Array, second: Array) -> list[int]:
     return [int(face_number(axis, first[axis])) for axis in range(3) if first[axis] == second[axis]]
 
 
-def face_points(nets: Nets) -> tuple[Array, IntArray]:
+def face_points(nets: ControlNets) -> tuple[Array, IntArray]:
     """Return points (k, 3) inside all faces that belong to the boundary, where knots meet, and these faces (k,)."""
     points, faces = [np.empty((0, 3))], [np.empty(0, dtype=np.int64)]
     for face in np.flatnonzero(nets.exposed).tolist():
@@ -71,7 +71,7 @@ def face_points(nets: Nets) -> tuple[Array, IntArray]:
     return np.concatenate(points), np.concatenate(faces)
 
 
-def _anchor_points(nets: Nets) -> tuple[Array, IntArray]:
+def _anchor_points(nets: ControlNets) -> tuple[Array, IntArray]:
     """Return the points of the anchors (k, 3), and their faces (k,)."""
     if nets.is_single:
         return edge_points(nets)
@@ -80,15 +80,17 @@ def _anchor_points(nets: Nets) -> tuple[Array, IntArray]:
 
 
 class Anchors:
-    """Hold the anchors as a SurfaceFit with fixed parameters; anchors have no effect until `aim` is called."""
+    """Hold the anchors as a Correspondence with fixed parameters; anchors have no effect until `aim` is called."""
 
-    def __init__(self, surface: SurfaceFit) -> None:
+    def __init__(self, surface: Correspondence) -> None:
         self._surface = surface
         nets = surface.places.nets
         self._share = _EDGES if nets.is_single else _FACES
         points, faces = _anchor_points(nets)
         places = SlidingParameters(nets, points, faces)
-        self.fit = SurfaceFit(places, points, np.zeros((len(points), 3, 3)), np.full(len(points), 1.0 / len(points)))
+        self.fit = Correspondence(
+            places, points, np.zeros((len(points), 3, 3)), np.full(len(points), 1.0 / len(points))
+        )
 
     def weight(self, weights: RoundWeights) -> float:
         """Return the weight of the anchors in a round, a share of the weight of the surface's data."""
@@ -116,7 +118,7 @@ class Anchors:
             points[corner], quadrics[corner] = given, _GIVEN_CORNER * np.eye(3)
         self.fit.aim(points, quadrics)
 
-    def restore(self, points: Array, yielding: Array) -> None:
+    def restore(self, points: Array, relaxation: Array) -> None:
         """Set the state of a checkpoint, so that later distances round as they would without an interruption."""
         self.fit.aim(points, np.zeros((len(points), 3, 3)))
-        self.fit.give_way(yielding)
+        self.fit.relax(relaxation)

@@ -12,7 +12,7 @@ from numpy.typing import DTypeLike
 
 from ..arrays import Array, Floats, Knots
 from ..spline.bspline import collocation, gauss_points
-from ..spline.nets import Nets
+from ..spline.control_nets import ControlNets
 from .blockwise import Blockwise, side_by_side
 from .operators import PiecewiseOperator
 from .tensor_product import Band, apply_band, band
@@ -88,7 +88,7 @@ class Fairness(Blockwise[BlockFairness]):
     bend: the second derivative of the term, in double precision.
     """
 
-    def __init__(self, nets: Nets, knots: tuple[Knots, ...], weight: float) -> None:
+    def __init__(self, nets: ControlNets, knots: tuple[Knots, ...], weight: float) -> None:
         super().__init__(nets, [BlockFairness(rows, nets.degree, weight) for rows in knots])
         self.bend = side_by_side(nets, [term.bend for term in self.terms])
 

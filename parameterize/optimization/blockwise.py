@@ -5,7 +5,7 @@ from functools import partial
 from typing import Any, Generic, TypeVar
 
 from ..arrays import Array, Floats
-from ..spline.nets import Nets
+from ..spline.control_nets import ControlNets
 from .operators import PiecewiseOperator
 from .term import RoundWeights, Term
 
@@ -15,7 +15,7 @@ T = TypeVar("T", bound=Term)
 class Blockwise(Generic[T]):
     """Sum the terms of the blocks; `terms` has one for each block, as a function of (3, n_u, n_v, n_w)."""
 
-    def __init__(self, nets: Nets, terms: Sequence[T]) -> None:
+    def __init__(self, nets: ControlNets, terms: Sequence[T]) -> None:
         self.nets, self.terms = nets, tuple(terms)
 
     def weight(self, weights: RoundWeights) -> float:
@@ -33,7 +33,7 @@ class Blockwise(Generic[T]):
         return side_by_side(self.nets, parts)
 
 
-def side_by_side(nets: Nets, operators: Sequence[PiecewiseOperator]) -> PiecewiseOperator:
+def side_by_side(nets: ControlNets, operators: Sequence[PiecewiseOperator]) -> PiecewiseOperator:
     """Return the operator on control points (3, n) that applies to each block the operator of this block."""
 
     def apply(piece: Callable[[Floats], Any], block: int, x: Floats) -> Any:

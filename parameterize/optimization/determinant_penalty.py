@@ -17,7 +17,7 @@ import numpy as np
 from ..arrays import Array, Floats, IntArray, Knots, Mask
 from ..spline.bernstein import add_products, binomials, cross_products, extraction
 from ..spline.bspline import breakpoints
-from ..spline.nets import Nets
+from ..spline.control_nets import ControlNets
 from ..threads import in_parallel
 from .blockwise import Blockwise
 from .operators import PiecewiseOperator
@@ -164,7 +164,7 @@ class DeterminantPenalty(Blockwise[BlockDeterminants]):
     weight grows by the inverse of the squared share.
     """
 
-    def __init__(self, nets: Nets, knots: tuple[Knots, ...], floor: float = MIN_COEFFICIENT) -> None:
+    def __init__(self, nets: ControlNets, knots: tuple[Knots, ...], floor: float = MIN_COEFFICIENT) -> None:
         self.floor, count = floor, int(nets.first_spans[-1])
         super().__init__(nets, [BlockDeterminants(rows, nets.degree, count, floor) for rows in knots])
         self._lowered = np.ones(count)

@@ -9,7 +9,7 @@ from scipy.ndimage import uniform_filter
 
 from ..arrays import Array, Floats, Knots
 from ..quality.rotations import closest_rotations
-from ..spline.nets import Nets
+from ..spline.control_nets import ControlNets
 from ..threads import in_parallel
 from .blockwise import Blockwise
 from .matrices import cofactors_and_determinants, dots, least_eigenvalues, squared_norms
@@ -136,7 +136,7 @@ class BlockDistortion:
 class Distortion(Blockwise[BlockDistortion]):
     """Compute the distortion of all blocks; knots: of each block, in units in which the mean of det J is near 1."""
 
-    def __init__(self, nets: Nets, knots: tuple[Knots, ...]) -> None:
+    def __init__(self, nets: ControlNets, knots: tuple[Knots, ...]) -> None:
         super().__init__(nets, [BlockDistortion(rows, nets.degree) for rows in knots])
 
     @property

@@ -12,7 +12,7 @@ import numpy as np
 from ..arrays import Array, Floats, IntArray
 from ..conjugate_gradients import conjugate_gradients
 from ..quality.distortion import own_boxes
-from ..spline.nets import Nets
+from ..spline.control_nets import ControlNets
 from ..spline.spline_map import SplineMap
 from .anchors import Anchors
 from .bending import Fairness
@@ -20,12 +20,12 @@ from .contact import ContactPenalty, contact_penalty
 from .determinant_penalty import DeterminantPenalty
 from .distortion import Distortion
 from .face_attraction import faces_towards
-from .normals import FacingPenalty, facing_penalty
+from .normals import AlignmentPenalty, alignment_penalty
 from .operators import weighted_sum
 from .reassignment import reassign
 from .spans import acting_on, with_neighbours
-from .surface_distance import SurfaceFit
-from .tensor_product import FastDiagonalization
+from .surface_distance import Correspondence
+from .tensor_product import KroneckerInverse
 from .term import RoundWeights, Term, Weights
 
 _REACH = 0.03  # while F grows, surface points farther from F than this do not slide, and draw F in all directions
@@ -42,12 +42,12 @@ class SplineEnergy:
     parameters.
     """
 
-    def __init__(self, nets: Nets, surface: SurfaceFit, weights: Weights) -> None:
+    def __init__(self, nets: ControlNets, surface: Correspondence, weights: Weights) -> None:
         self.surface, self.nets = surface, nets
         self.anchors = Anchors(surface)
-        self._facing: FacingPenalty | None = None
+        self._alignment: AlignmentPenalty | None = None
         self._contact: ContactPenalty | None = None
-        self._approach: SurfaceFit | None = None
+        self._approach: Correspondence | None = None
         self._weights, self._grows = weights, False
         self._round = RoundWeights(0.0, weights.surface)
         self._measure_in(np.ones((len(nets.knots), 3)), np.zeros(int(nets.first_spans[-1])))
@@ -71,7 +71,7 @@ class SplineEnergy:
         """Return the terms of the boundary that are in effect at present."""
         if self._approach is not None:
             return (self._approach,)
-        terms: tuple[Term | None, ...] = (self.surface, self.anchors, self._contact, self._facing)
+        terms: tuple[Term | None, ...] = (self.surface, self.anchors, self._contact, self._alignment)
         return tuple(term for term in terms if term is not None)
 
     def _preconditioner(self) -> Callable[[Floats], Floats]:
@@ -84,7 +84,7 @@ class SplineEnergy:
             rough = fairness.with_stiffness()
             for matrix in rough:
                 matrix[[0, -1], [0, -1]] += _PULL * self._round.surface / 6.0
-            parts.append(FastDiagonalization(rough, fairness.mass, dtype=np.float32))
+            parts.append(KroneckerInverse(rough, fairness.mass, dtype=np.float32))
         nets = self.nets
 
         def apply(residual: Floats) -> Floats:
@@ -116,12 +116,12 @@ class SplineEnergy:
         reach = _REACH if self._grows else np.inf
         self.surface.hold(np.linalg.norm(self.surface.residuals(control), axis=1) > reach)
 
-    def watch_facing(self, control: Array) -> None:
+    def watch_alignment(self, control: Array) -> None:
         """Penalise, from now on, the places where the normal of F's boundary hardly agrees with the mesh at `control`.
 
         While F grows there is no such penalty, because F is too far from the mesh for the normals to be compared.
         """
-        self._facing = None if self._grows else facing_penalty(self.surface, control)
+        self._alignment = None if self._grows else alignment_penalty(self.surface, control)
 
     def watch_contact(self, control: Array) -> IntArray:
         """Penalise, from now on, contact between sheets of F's boundary at `control`; return the spans in contact.
@@ -141,24 +141,24 @@ class SplineEnergy:
         else:
             places.slide(control, points)
             places.relax(_RELAXATIONS)
-        self.watch_facing(control)
+        self.watch_alignment(control)
         if self._contact is not None:
             self._contact = contact_penalty(SplineMap(self.nets, control), near=self._contact.near)
 
-    def give_way(self, spans: IntArray, factor: float) -> None:
+    def relax(self, spans: IntArray, factor: float) -> None:
         """Multiply by `factor` the weights of the boundary data in and next to the spans (k, 4) of the map."""
         for fit in (self.surface, self.anchors.fit):
-            fit.give_way(np.where(fit.places.near_spans(spans), factor, 1.0) * fit.yielding)
+            fit.relax(np.where(fit.places.near_spans(spans), factor, 1.0) * fit.relaxation)
 
     @property
     def yields(self) -> bool:
         """Return whether some of the boundary data have less than their whole weight."""
-        return any(bool((fit.yielding < 1.0).any()) for fit in (self.surface, self.anchors.fit))
+        return any(bool((fit.relaxation < 1.0).any()) for fit in (self.surface, self.anchors.fit))
 
     def take_back(self, factor: float) -> None:
-        """Divide the factors that `give_way` has applied by `factor`; a factor becomes 1 at most."""
+        """Divide the factors that `relax` has applied by `factor`; a factor becomes 1 at most."""
         for fit in (self.surface, self.anchors.fit):
-            fit.give_way(np.minimum(fit.yielding / factor, 1.0))
+            fit.relax(np.minimum(fit.relaxation / factor, 1.0))
 
     def volume_part(self, control: Array) -> tuple[float, Array, int]:
         """Return the energy of the solid's terms, its gradient (3, n), and the number of folded points.

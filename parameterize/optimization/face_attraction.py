@@ -9,23 +9,23 @@ import numpy as np
 
 from ..arrays import Array
 from ..spline.spline_map import SplineMap
-from .reassignment import boundary_samples, nearest_facing
+from .reassignment import boundary_samples, nearest_aligned
 from .sliding import SlidingParameters
-from .surface_distance import TANGENTIAL, SurfaceFit
+from .surface_distance import TANGENTIAL, Correspondence
 
 _A_SPAN = 2  # samples a direction and span
 _FAR = 0.7  # times the width of a block: goals farther away than this hardly draw
 _AGREES = 0.5  # cosine of the angle between two normals that agree
 
 
-def faces_towards(surface: SurfaceFit, control: Array) -> SurfaceFit:
+def faces_towards(surface: Correspondence, control: Array) -> Correspondence:
     """Return samples of the boundary of F, with fixed parameters, whose goals are points of the surface.
 
     A sample whose goal does not face the same way has no weight.
     """
     nets = surface.places.nets
     samples = boundary_samples(SplineMap(nets, control), _A_SPAN)
-    chosen = nearest_facing(surface.points, surface.normals, samples.points, samples.normals)
+    chosen = nearest_aligned(surface.points, surface.normals, samples.points, samples.normals)
     normals = surface.normals[chosen]
     agrees = (normals * samples.normals).sum(axis=1) > _AGREES
     quadrics = normals[:, :, None] * normals[:, None, :] + TANGENTIAL * np.eye(3)
@@ -33,4 +33,4 @@ def faces_towards(surface: SurfaceFit, control: Array) -> SurfaceFit:
     distances = np.linalg.norm(surface.points[chosen] - samples.points, axis=1)
     weights = samples.areas * agrees / (1.0 + (distances / (_FAR * widths)) ** 4)
     places = SlidingParameters(nets, samples.parameters, samples.faces)
-    return SurfaceFit(places, surface.points[chosen], quadrics, weights / weights.sum())
+    return Correspondence(places, surface.points[chosen], quadrics, weights / weights.sum())

@@ -7,14 +7,14 @@ import numpy as np
 
 from ..arrays import Array, IntArray, Mask
 from ..spline.bspline import basis_derivatives, breakpoints
-from ..spline.nets import Nets
+from ..spline.control_nets import ControlNets
 from ..threads import in_parallel
 from .operators import pieces
 
 Polynomials = tuple[IntArray, Array, IntArray, Array, IntArray]
 
 
-def polynomials_of(nets: Nets) -> Polynomials:
+def polynomials_of(nets: ControlNets) -> Polynomials:
     """Return the basis functions that are not zero on a span as polynomials, which are cheap to evaluate.
 
     The arrays hold the spans of all directions of all blocks one after the other: the first span of each direction

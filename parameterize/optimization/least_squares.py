@@ -8,7 +8,7 @@ from ..spline.bspline import basis_derivatives
 from ..spline.spline_map import SplineMap
 from .bending import bending_operator, grams
 from .operators import ControlRows, weighted_sum
-from .tensor_product import FastDiagonalization
+from .tensor_product import KroneckerInverse
 
 
 def fit_pairs(
@@ -29,7 +29,7 @@ def fit_pairs(
     matrices = grams(knots, (degree,) * 3)
     mass, _, curve = matrices
     smooth = bending_operator(matrices, fairness)
-    precondition = FastDiagonalization(tuple(fairness * c for c in curve), mass, shift=1.0)
+    precondition = KroneckerInverse(tuple(fairness * c for c in curve), mass, shift=1.0)
     operator = weighted_sum([(1.0, rows.squared(weights[:, None, None] * np.eye(3))), (1.0, smooth)])
     right = rows.adjoint(weights[:, None] * points, np.zeros((3, *sizes)))
     found = conjugate_gradients(operator, right, precondition, tolerance=1e-5, max_iterations=300)

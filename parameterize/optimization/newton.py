@@ -128,7 +128,7 @@ def descend(energy: SplineEnergy, control: Array, rule: StoppingRule, after_step
 
     after_step: a function that is called with the point after each step.
     """
-    energy.watch_facing(control)
+    energy.watch_alignment(control)
     point = _evaluate(control, energy)
     damping, acceleration, ended = 0.0, Acceleration(_MEMORY), False
     while not ended:

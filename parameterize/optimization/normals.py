@@ -15,7 +15,7 @@ from ..arrays import Array, Floats
 from ..cube.cube import axis_and_side
 from .matrices import dots
 from .operators import ControlRows, PiecewiseOperator
-from .surface_distance import SurfaceFit
+from .surface_distance import Correspondence
 from .term import RoundWeights
 
 _FLOOR = 0.1  # (t_a x t_b) . n below this is penalised; its mean over the boundary is near 1
@@ -23,7 +23,7 @@ _MARGIN = 3.0  # times that: points below may fall under it in the next step and
 
 
 @dataclass(frozen=True, eq=False)
-class FacingPenalty:
+class AlignmentPenalty:
     """Compute the sum of weight * (floor - (t_a x t_b) . n)_+^2 over k points.
 
     tangents: the rows that yield t_a and t_b at the points. normals: (3, k); a normal points out of the block where
@@ -50,7 +50,7 @@ class FacingPenalty:
         """Return the Gauss-Newton part of the second derivative at `control`, as an operator in single precision."""
         along_a, along_b = (rows.in_single() for rows in self.tangents)
         normals, weights = self.normals.astype(np.float32), self.weights.astype(np.float32)
-        single = FacingPenalty((along_a, along_b), normals, weights, self.floor)
+        single = AlignmentPenalty((along_a, along_b), normals, weights, self.floor)
         by_a, by_b, size = single._slopes(control.astype(np.float32))
         scale = 2.0 * single.weights * (size < self.floor)
 
@@ -71,7 +71,7 @@ class FacingPenalty:
         return along_a.adjoint((factor * by_a).T, like) + along_b.adjoint((factor * by_b).T, like)
 
 
-def facing_penalty(fit: SurfaceFit, control: Array, floor: float = _FLOOR) -> FacingPenalty:
+def alignment_penalty(fit: Correspondence, control: Array, floor: float = _FLOOR) -> AlignmentPenalty:
     """Return the penalty at the points of the surface where (t_a x t_b) . n is near the floor at these control points.
 
     The penalty includes points that could fall below the floor in the next step.
@@ -85,7 +85,7 @@ def facing_penalty(fit: SurfaceFit, control: Array, floor: float = _FLOOR) -> Fa
     size = np.einsum("nc,nc->n", np.cross(tangent_a, tangent_b), normals) / (lengths[0] * lengths[1])
     low = size < _MARGIN * floor
     along_a, along_b = window.weights(1, 0) / lengths[0][:, None], window.weights(0, 1) / lengths[1][:, None]
-    return FacingPenalty(
+    return AlignmentPenalty(
         (ControlRows(window.indices[low], along_a[low]), ControlRows(window.indices[low], along_b[low])),
         np.ascontiguousarray(normals[low].T),
         fit.weights[low],

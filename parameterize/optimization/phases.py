@@ -13,9 +13,9 @@ from typing import ClassVar
 
 import numpy as np
 
+from .certified_map import CertifiedMap
 from .endings import Reason
 from .newton import GAIN
-from .optimized import Optimized
 from .reassignment import reassign
 from .spans import acting_on, with_neighbours
 from .state import MOST_WATCHED, State
@@ -26,7 +26,7 @@ FULL_PENALTY = 2500.0  # weight on det J once F has its shape: folds open even a
 RAMP = (20.0, 100.0, 500.0, FULL_PENALTY)  # one a round, for a map that starts folded: it takes its shape through folds
 PATIENT_ROUNDS = 2  # of a stage: after them the penalty grows at unproved spans
 FIRM_ROUNDS = 4  # after these the surface gives way at unproved spans, which more weight alone has not unfolded
-GIVING_WAY = 0.25  # factor of the surface's weights there, each round: an edge in a valley cannot lie on the surface
+RELAXING = 0.25  # factor of the surface's weights there, each round: an edge in a valley cannot lie on the surface
 _CONTACT_WAY = 0.0625  # the same where the boundary meets itself: these rounds are few
 _STALLING = 8  # rounds in which the unproved spans are not halved: another start costs as much as waiting longer
 _SMOOTHING_ROUNDS = 2  # the same; F is then smoothed there, as no descent undoes some folds
@@ -41,7 +41,7 @@ class Phase(ABC):
     """Define rounds with one aim.
 
     penalties: the weights of the penalties on det J, one for each round of the stage; later rounds have the last
-    weight. firm: the number of rounds of the stage after which the surface's data give way at unproved spans. shares:
+    weight. patience: the number of rounds of the stage after which the surface's data relax at unproved spans. shares:
     where F grows, the shares of the weight of the surface's data, one for each round of the stage. steps: the largest
     number of Newton steps in a round; None for the number in the options. by_faces: whether the faces of F are drawn to
     the surface, and not the points of the surface draw F.
@@ -50,7 +50,7 @@ class Phase(ABC):
     name: ClassVar[str]
     by_faces: ClassVar[bool] = False
     penalties: tuple[float, ...] = (FULL_PENALTY,)
-    firm: int = FIRM_ROUNDS
+    patience: int = FIRM_ROUNDS
     shares: tuple[float, ...] = ()
     steps: int | None = None
 
@@ -65,7 +65,7 @@ class Phase(ABC):
         else:
             state.energy.anchors.aim(state.spline.control)
 
-    def amended(self, state: State, found: Optimized) -> Optimized:
+    def amended(self, state: State, found: CertifiedMap) -> CertifiedMap:
         """Return the map that a round has found, or a better map made from it."""
         return found
 
@@ -91,7 +91,7 @@ class Shape(Phase):
 class Unfold(Phase):
     """Raise the penalty on unproved spans, let the surface's data give way near these, and smooth a few spans.
 
-    far: a root mean square distance from the surface; a folded map that is farther away is given up in firm rounds.
+    far: a root mean square distance from the surface; a folded map that is farther away is given up in patience rounds.
     far_first: the same distance after `first` rounds of the stage, the first round in which F no longer grows.
     """
 
@@ -100,13 +100,13 @@ class Unfold(Phase):
     far_first: float = 0.02
     first: int = 0
 
-    def amended(self, state: State, found: Optimized) -> Optimized:
+    def amended(self, state: State, found: CertifiedMap) -> CertifiedMap:
         """Smooth the map near spans that stay unproved; return the smoothed map where it has fewer unproved spans."""
-        unproved, patience = found.unproved, max(self.firm, state.halved + _SMOOTHING_ROUNDS)
+        unproved, patience = found.unproved, max(self.patience, state.halved + _SMOOTHING_ROUNDS)
         if state.number < patience or not 0 < len(unproved) <= _MOST_SMOOTHED:
             return found
         control = state.energy.smoothed(found.spline.control, unproved)
-        smoothed = Optimized.of(found.spline.with_control(control))
+        smoothed = CertifiedMap.of(found.spline.with_control(control))
         _log.info("smoothed near %d spans: %d unproved", len(unproved), len(smoothed.unproved))
         return smoothed if smoothed.faults < found.faults else found
 
@@ -116,7 +116,7 @@ class Unfold(Phase):
             return Reason.CERTIFIED
         if state.number > state.halved + _STALLING:
             return Reason.STALLED
-        if state.number < self.firm:
+        if state.number < self.patience:
             return None
         if state.many:
             return Reason.TOO_MANY_FOLDED
@@ -144,7 +144,7 @@ class Separate(Phase):
         Several blocks are drawn out by their anchors, and before the first round all places are found anew.
         """
         energy, control = state.energy, state.spline.control
-        energy.give_way(energy.watch_contact(control), _CONTACT_WAY)
+        energy.relax(energy.watch_contact(control), _CONTACT_WAY)
         super().begin(state)
         if not energy.nets.is_single and not state.rounds[self.name]:
             reassign(energy.surface, control, first=True)
@@ -163,7 +163,7 @@ class Polish(Phase):
     """Restore the weight that the surface's data have lost, step by step, as far as F stays certified."""
 
     name = "polish"
-    firm: int = sys.maxsize
+    patience: int = sys.maxsize
     rounds: int = 6
 
     def begin(self, state: State) -> None:
@@ -172,10 +172,10 @@ class Polish(Phase):
         if state.rounds["separate"]:
             energy.watch_contact(state.spline.control)
         if state.settled:
-            energy.take_back(GIVING_WAY)
+            energy.take_back(RELAXING)
         energy.anchors.aim(state.spline.control)
 
-    def amended(self, state: State, found: Optimized) -> Optimized:
+    def amended(self, state: State, found: CertifiedMap) -> CertifiedMap:
         """Move the spans that fold again back to their certified shape; return the given map where that fails."""
         energy, folded, mended = state.energy, found.unproved, found
         held = np.zeros(len(energy.determinants.weights), dtype=bool)
@@ -186,7 +186,7 @@ class Polish(Phase):
             held |= with_neighbours(unproved, energy.nets)
             back = acting_on(held, energy.nets)
             control = np.where(back, state.best.spline.control, found.spline.control)
-            mended = Optimized.of(found.spline.with_control(control))
+            mended = CertifiedMap.of(found.spline.with_control(control))
         if mended is found or mended.rank > state.best.rank:
             return found
         places = energy.surface.places
@@ -196,7 +196,7 @@ class Polish(Phase):
             places.place(*before)
             return found
         energy.determinants.activate(folded)
-        energy.give_way(folded, GIVING_WAY)
+        energy.relax(folded, RELAXING)
         _log.info("moved back near %d spans", len(folded))
         return mended
 

@@ -13,21 +13,21 @@ from ..arrays import Array, IntArray
 from ..spline.bspline import divided_spans
 from ..spline.orientation import face_vectors
 from ..spline.spline_map import SplineMap
-from .surface_distance import SurfaceFit
+from .surface_distance import Correspondence
 
 _A_SPAN = 4  # samples a direction and span
 _NORMALS = 0.5  # length, at volume 1, by which normals are multiplied: perpendicular ones count as 0.7 apart
 _CLOSER = 0.7  # of the present distance: a place that is not closer than this stays, as slides bring it closer
 
 
-def reassign(surface: SurfaceFit, control: Array, *, first: bool = False) -> None:
+def reassign(surface: Correspondence, control: Array, *, first: bool = False) -> None:
     """Move places of the surface's points to the nearest sample of the boundary that faces the same way.
 
     Places that are hardly farther away than that sample stay; with `first`, none does.
     """
     places = surface.places
     samples = boundary_samples(SplineMap(places.nets, control), _A_SPAN)
-    chosen = nearest_facing(samples.points, samples.normals, surface.points, surface.normals)
+    chosen = nearest_aligned(samples.points, samples.normals, surface.points, surface.normals)
     present = np.linalg.norm(surface.residuals(control), axis=1)
     closer = np.linalg.norm(samples.points[chosen] - surface.points, axis=1) < _CLOSER * present
     moved = np.ones_like(closer) if first else closer
@@ -37,7 +37,7 @@ def reassign(surface: SurfaceFit, control: Array, *, first: bool = False) -> Non
     )
 
 
-def nearest_facing(points: Array, normals: Array, others: Array, other_normals: Array) -> IntArray:
+def nearest_aligned(points: Array, normals: Array, others: Array, other_normals: Array) -> IntArray:
     """Return for each of `others` (n, 3) the number of the nearest of `points` (m, 3) that faces the same way, (n,).
 
     The distance of two points with unit normals has three more coordinates, the normals times a length.

@@ -13,14 +13,14 @@ from ..config import SplineConfig
 from ..progress import History, Progress, ProgressCallback, ignore, timed
 from ..spline.spline_map import SplineMap
 from ..threads import one_blas_thread
+from .certified_map import CertifiedMap
 from .endings import Course, Reason
 from .energy import SplineEnergy
 from .newton import FIRST_GAIN, Point, StoppingRule, descend
-from .optimized import Optimized
-from .phases import GIVING_WAY, PATIENT_ROUNDS, Phase, Schedule
+from .phases import PATIENT_ROUNDS, RELAXING, Phase, Schedule
 from .spans import edge_spans
 from .state import State
-from .surface_distance import SurfaceFit
+from .surface_distance import Correspondence
 from .term import Weights
 
 _log = logging.getLogger(__name__)
@@ -30,7 +30,7 @@ _SPAN_MOST = 125.0  # of these factors together
 
 def optimize(
     start: SplineMap,
-    surface: SurfaceFit,
+    surface: Correspondence,
     config: SplineConfig,
     schedule: Schedule,
     weights: Weights = Weights(),
@@ -40,7 +40,7 @@ def optimize(
     checkpoints: Checkpoints | None = None,
     begun: int = 0,
     watched: IntArray | None = None,
-) -> tuple[Optimized, Course]:
+) -> tuple[CertifiedMap, Course]:
     """Minimise the energy from a map at volume 1, in rounds, phase after phase; return a map and the rounds' course.
 
     A round sets weights, descends and certifies the map. The returned map is the last certified map whose boundary is
@@ -57,7 +57,7 @@ def optimize(
         energy.determinants.activate(edge_spans(start.nets))
         if watched is not None:
             energy.determinants.activate(watched)
-        first = Optimized.of(start)
+        first = CertifiedMap.of(start)
         places = surface.places.parameters, surface.places.cube_faces
         state = State(energy, start, first, places, number=begun, halved=begun)
         state.restore(checkpoints, history)
@@ -82,7 +82,7 @@ def _round(state: State, phase: Phase, schedule: Schedule, report: "_StepReport"
     energy.start_round(state.spline.control, phase.penalty(number), share, by_faces=phase.by_faces)
     rule = StoppingRule(steps, schedule.gain if number else FIRST_GAIN)
     control = descend(energy, state.spline.control, rule, report)
-    found = Optimized.of(state.spline.with_control(control))
+    found = CertifiedMap.of(state.spline.with_control(control))
     state.last_square = energy.surface.mean_square(control)
     found = phase.amended(state, found)
     verdict, unproved = found.certificate.verdict, found.unproved
@@ -96,8 +96,8 @@ def _round(state: State, phase: Phase, schedule: Schedule, report: "_StepReport"
         energy.determinants.activate(unproved)
     if number >= PATIENT_ROUNDS and len(unproved):
         energy.determinants.stiffen(unproved, _SPAN_GROWTH, _SPAN_MOST)
-    if number >= phase.firm and len(unproved):
-        energy.give_way(unproved, GIVING_WAY)
+    if number >= phase.patience and len(unproved):
+        energy.relax(unproved, RELAXING)
     if 2 * len(unproved) <= state.fewest or number <= schedule.grown:
         state.fewest, state.halved = len(unproved), number
     state.number += 1

@@ -15,7 +15,7 @@ from ..arrays import Array, IntArray, Knots, Mask
 from ..cube.cube import axis_and_side, damped_solution, nearest_faces, tangent_axes
 from ..cube.flips import new_flips, unflip, untangle, untangle_whole
 from ..spline.bspline import breakpoints
-from ..spline.nets import Nets
+from ..spline.control_nets import ControlNets
 from ..threads import in_parallel
 from .adjacent_faces import Edges, next_faces
 from .face_window import FaceWindow, Polynomials, fill_tangents, fill_window, polynomials_of
@@ -31,7 +31,7 @@ class SlidingParameters:
     """Hold parameters (N, 3) on faces (N,) of a block, and the rows that yield F there.
 
     The points to which parameters slide are not part of this class, because the samples of contact.py have none.
-    SurfaceFit, a term of the energy, adds the points, their metrics and their weights.
+    Correspondence, a term of the energy, adds the points, their metrics and their weights.
 
     cube_faces: the faces, 6 * block + face; by default the nearest ones of one cube. triangles: (m, 3), between the
     points; on one cube, `relax` and `slide` keep the layout of these one-to-one. On a body of several
@@ -42,7 +42,7 @@ class SlidingParameters:
 
     def __init__(
         self,
-        nets: Nets,
+        nets: ControlNets,
         parameters: Array,
         cube_faces: IntArray | None = None,
         triangles: IntArray = _NO_TRIANGLES,
@@ -75,7 +75,7 @@ class SlidingParameters:
         for known in ("window", "rows"):
             self.__dict__.pop(known, None)
 
-    def on_nets(self, nets: Nets) -> "SlidingParameters":
+    def on_nets(self, nets: ControlNets) -> "SlidingParameters":
         """Return the same parameters for blocks with other knots."""
         return SlidingParameters(nets, self.parameters, self.cube_faces, self.triangles, self.fixed.copy())
 
@@ -259,7 +259,7 @@ def _slid(
 
 
 def fold_over_edges(
-    nets: Nets, parameters: Array, cube_faces: IntArray, fixed: Mask | None = None
+    nets: ControlNets, parameters: Array, cube_faces: IntArray, fixed: Mask | None = None
 ) -> tuple[Array, IntArray]:
     """Return parameters and faces after steps that left a face continue on the neighbouring face; all blocks are cubes.
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..arrays import IntArray, Mask
 from ..spline.body import shared_numbers
-from ..spline.nets import Nets
+from ..spline.control_nets import ControlNets
 
 
 def in_blocks(spans: list[IntArray]) -> IntArray:
@@ -18,14 +18,14 @@ def in_blocks(spans: list[IntArray]) -> IntArray:
     return np.concatenate([np.insert(rows.reshape(-1, 3), 0, block, axis=1) for block, rows in enumerate(spans)])
 
 
-def numbers(spans: IntArray, nets: Nets) -> IntArray:
+def numbers(spans: IntArray, nets: ControlNets) -> IntArray:
     """Return the numbers (k,) of spans (k, 4) in a mask."""
     counts = np.array(nets.spans)[spans[:, 0]]
     inside = (spans[:, 1] * counts[:, 1] + spans[:, 2]) * counts[:, 2] + spans[:, 3]
     return np.asarray(nets.first_spans[spans[:, 0]] + inside)
 
 
-def with_neighbours(spans: IntArray, nets: Nets) -> Mask:
+def with_neighbours(spans: IntArray, nets: ControlNets) -> Mask:
     """Return the mask (m,) of the spans (k, 4) and of all spans that touch these, through interfaces too."""
     labels = _corner_labels(nets)
     touched = np.zeros(max(int(row.max()) for row in labels) + 1, dtype=bool)
@@ -37,7 +37,7 @@ def with_neighbours(spans: IntArray, nets: Nets) -> Mask:
 
 
 @lru_cache(maxsize=4)
-def _corner_labels(nets: Nets) -> tuple[IntArray, ...]:
+def _corner_labels(nets: ControlNets) -> tuple[IntArray, ...]:
     """Return the number of each corner of the spans of each block; corners that interfaces make one have one number."""
     return shared_numbers([(u + 1, v + 1, w + 1) for u, v, w in nets.spans], nets.interfaces)[0]
 
@@ -47,7 +47,7 @@ def _any_corner(corners: Mask) -> Mask:
     return np.asarray(np.lib.stride_tricks.sliding_window_view(corners, (2, 2, 2)).any(axis=(3, 4, 5)))
 
 
-def acting_on(spans: Mask, nets: Nets) -> Mask:
+def acting_on(spans: Mask, nets: ControlNets) -> Mask:
     """Return the mask (n,) of the control points that act on marked spans (m,), on both sides of interfaces."""
     marked = []
     for block, counts in enumerate(nets.spans):
@@ -58,7 +58,7 @@ def acting_on(spans: Mask, nets: Nets) -> Mask:
     return nets.merged_mask(np.concatenate(marked))
 
 
-def edge_spans(nets: Nets) -> IntArray:
+def edge_spans(nets: ControlNets) -> IntArray:
     """Return the spans (k, 4) that touch one of the 12 edges of their block."""
     found = []
     for counts in nets.spans:

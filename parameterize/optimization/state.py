@@ -11,8 +11,8 @@ from ..arrays import Array, IntArray
 from ..checkpoint import Checkpoints
 from ..progress import History
 from ..spline.spline_map import SplineMap
+from .certified_map import CertifiedMap
 from .energy import SplineEnergy
-from .optimized import Optimized
 
 MOST_WATCHED = 1000  # spans: where more are unproved, the penalty at the Gauss points unfolds most first
 _CHECKPOINT = "spline"
@@ -25,7 +25,7 @@ class State:
 
     energy: SplineEnergy
     spline: SplineMap
-    best: Optimized
+    best: CertifiedMap
     best_places: tuple[Array, IntArray]  # the surface's parameters (N, 3) that belong to it, and their faces (N,)
     number: int  # of rounds done, those on other knots among them
     halved: int  # the round in which the number of unproved spans was last halved
@@ -48,7 +48,7 @@ class State:
         """Return whether the last round has ended with the best map, and not with a map that folds again."""
         return np.array_equal(self.spline.control, self.best.spline.control)
 
-    def keep(self, found: Optimized) -> None:
+    def keep(self, found: CertifiedMap) -> None:
         """Set a map, with the present parameters of the surface, as the best map."""
         places = self.energy.surface.places
         self.best, self.best_places = found, (places.parameters, places.cube_faces)
@@ -64,9 +64,9 @@ class State:
             "best_cube_faces": self.best_places[1],
             "parameters": surface.places.parameters,
             "cube_faces": surface.places.cube_faces,
-            "yielding": surface.yielding,
+            "relaxation": surface.relaxation,
             "anchors": anchors.points,
-            "anchors_yielding": anchors.yielding,
+            "anchors_yielding": anchors.relaxation,
             "span_weights": self.energy.determinants.weights,
         }
         numbers = {name: getattr(self, name) for name in _NUMBERS}
@@ -80,11 +80,11 @@ class State:
         arrays, state = saved
         energy = self.energy
         energy.surface.places.place(arrays["parameters"], arrays["cube_faces"])
-        energy.surface.give_way(arrays["yielding"])
+        energy.surface.relax(arrays["relaxation"])
         energy.anchors.restore(arrays["anchors"], arrays["anchors_yielding"])
         energy.determinants.weigh(arrays["span_weights"])
         self.spline = self.spline.with_control(arrays["control"])
-        self.best = Optimized.of(self.spline.with_control(arrays["best"]))
+        self.best = CertifiedMap.of(self.spline.with_control(arrays["best"]))
         self.best_places = arrays["best_parameters"], arrays["best_cube_faces"]
         for name in _NUMBERS:
             setattr(self, name, state[name])

@@ -8,7 +8,7 @@ normal only, on sharp edges across both sides, and at corners in all directions.
 import numpy as np
 
 from ..arrays import Array, Mask
-from ..spline.nets import Nets
+from ..spline.control_nets import ControlNets
 from ..surface.geometry import vertex_normals
 from .operators import PiecewiseOperator
 from .sliding import SlidingParameters
@@ -17,7 +17,7 @@ from .term import RoundWeights
 TANGENTIAL = 2e-4  # share of the distance within the tangent plane: holds sliding points, and hardly draws F
 
 
-class SurfaceFit:
+class Correspondence:
     """Compute the residuals F(p) - v and their energy.
 
     places: the parameters p. points: (N, 3), the surface points v at volume 1. quadrics: (N, 3, 3). weights: (N,), with
@@ -37,33 +37,33 @@ class SurfaceFit:
         self.places, self.given_corners = places, given_corners
         self.normals = vertex_normals(points, places.triangles)
         self._weights = weights
-        self.yielding = np.ones(len(points))
+        self.relaxation = np.ones(len(points))
         self._held = np.zeros(len(points), dtype=bool)
         self.aim(points, quadrics)
 
-    def on_nets(self, nets: Nets) -> "SurfaceFit":
+    def on_nets(self, nets: ControlNets) -> "Correspondence":
         """Return the same data for blocks with other knots, at the present parameters and weights."""
         places, given = self.places.on_nets(nets), self.given_corners
-        other = SurfaceFit(places, self.points, self._quadrics, self._weights, given_corners=given)
-        other.give_way(self.yielding)
+        other = Correspondence(places, self.points, self._quadrics, self._weights, given_corners=given)
+        other.relax(self.relaxation)
         return other
 
     def aim(self, points: Array, quadrics: Array) -> None:
         """Set other points (N, 3) and quadrics (N, 3, 3) as goals."""
         self.points, self._quadrics = points, quadrics
-        self.give_way(self.yielding)
+        self.relax(self.relaxation)
 
-    def give_way(self, yielding: Array) -> None:
-        """Multiply the points' weights by `yielding` (N,), which replaces the factors of an earlier call."""
-        self.yielding = yielding
-        self.weights = yielding * self._weights
+    def relax(self, relaxation: Array) -> None:
+        """Multiply the points' weights by `relaxation` (N,), which replaces the factors of an earlier call."""
+        self.relaxation = relaxation
+        self.weights = relaxation * self._weights
         quadrics = np.where(self._held[:, None, None], np.eye(3), self._quadrics)
         self._metric = self.weights[:, None, None] * quadrics
 
     def hold(self, held: Mask) -> None:
         """Measure the distance of held points (N,) in all directions, of the other points as their quadrics demand."""
         self._held = held
-        self.give_way(self.yielding)
+        self.relax(self.relaxation)
 
     def weight(self, weights: RoundWeights) -> float:
         """Return the weight of the surface's data."""

@@ -220,7 +220,7 @@ def _graded_points(knots: Array, outer: int, inner: int) -> tuple[Array, Array]:
     return points, weights
 
 
-class FastDiagonalization:
+class KroneckerInverse:
     """Apply the inverse of A_0 x M x M + M x A_1 x M + M x M x A_2 + shift * M x M x M (Lynch, Rice, Thomas 1964).
 
     matrices: three symmetric matrices A_d (n, n). mass: three matrices M_d. dtype: the precision of the vectors. The

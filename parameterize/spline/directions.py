@@ -11,11 +11,11 @@ import numpy as np
 
 from ..arrays import IntArray
 from .body import numbers_of_classes
+from .control_nets import ControlNets
 from .interface import varying
-from .nets import Nets
 
 
-def tied_spans(nets: Nets) -> list[IntArray]:
+def tied_spans(nets: ControlNets) -> list[IntArray]:
     """Return for each direction of each block, in the order u, v, w of block after block, the classes of its spans.
 
     Spans that interfaces make one have the same class. Classes have the numbers from 0 on, in the order in which their

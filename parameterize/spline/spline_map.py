@@ -7,21 +7,21 @@ import numpy as np
 from ..arrays import Array, Knots
 from .body import Body
 from .bspline import greville, interpolate_grid
-from .nets import Nets
+from .control_nets import ControlNets
 from .volume import BSplineVolume
 
 
 @dataclass(frozen=True, eq=False)
 class SplineMap:
-    """A map F of one degree in all directions; control: (3, n), the control points of all blocks, see Nets."""
+    """A map F of one degree in all directions; control: (3, n), the control points of all blocks, see ControlNets."""
 
-    nets: Nets
+    nets: ControlNets
     control: Array
 
     @classmethod
     def on_cube(cls, degree: int, knots: Knots, control: Array) -> "SplineMap":
         """Return the map of one cube with control points (3, n_u, n_v, n_w)."""
-        return cls(Nets(degree, (knots,)), control.reshape(3, -1))
+        return cls(ControlNets(degree, (knots,)), control.reshape(3, -1))
 
     @classmethod
     def of(cls, volume: BSplineVolume) -> "SplineMap":

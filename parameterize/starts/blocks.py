@@ -11,18 +11,18 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..arrays import Array, Knots
-from ..blocks.layout import Block, BlockLayout, LayoutError
 from ..checkpoint import Checkpoints
 from ..config import Config, scaled_steps
 from ..cube.cutting import subdivide_finely
+from ..layouts.rods.along_skeleton import Block, BlockLayout, LayoutError
 from ..optimization.phases import Polish, Schedule, Separate, Unfold
 from ..optimization.reassignment import reassign
 from ..optimization.sliding import SlidingParameters
-from ..optimization.surface_distance import TANGENTIAL, SurfaceFit
+from ..optimization.surface_distance import TANGENTIAL, Correspondence
 from ..optimization.term import Weights
 from ..progress import timed
 from ..spline.bspline import greville, open_uniform_knots
-from ..spline.nets import Nets
+from ..spline.control_nets import ControlNets
 from ..spline.spline_map import SplineMap
 from ..surface.geometry import vertex_quadrics, vertex_weights
 from ..threads import one_blas_thread
@@ -115,10 +115,10 @@ def thin_blocks(layout: BlockLayout, degree: int) -> SplineMap:
     return SplineMap(nets, nets.merged(nets.joined(points)))
 
 
-def nets_of(layout: BlockLayout, degree: int) -> Nets:
+def nets_of(layout: BlockLayout, degree: int) -> ControlNets:
     """Return the control nets of a layout's blocks, with uniform knots."""
     knots = [tuple(open_uniform_knots(degree + spans, degree) for spans in block.spans) for block in layout.blocks]
-    return Nets(degree, tuple(knots), layout.interfaces)  # type: ignore[arg-type]
+    return ControlNets(degree, tuple(knots), layout.interfaces)  # type: ignore[arg-type]
 
 
 def points_of(block: Block, knots: Knots, degree: int) -> Array:
@@ -127,14 +127,14 @@ def points_of(block: Block, knots: Knots, degree: int) -> Array:
     return np.moveaxis(block.points(places), -1, 0)
 
 
-def surface_fit(task: Task, first: SplineMap) -> SurfaceFit:
+def surface_fit(task: Task, first: SplineMap) -> Correspondence:
     """Return the surface's points, each with its first place on the blocks."""
     surface = task.surface
     points, faces = subdivide_finely(surface.unit_vertices, surface.faces, _LONGEST, task.own + MOST_POINTS)
     face = int(np.flatnonzero(first.nets.exposed)[0])  # any: places are assigned at once
     places = np.full((len(points), 3), 0.5)
     places[:, face % 6 // 2] = face % 2
-    fit = SurfaceFit(
+    fit = Correspondence(
         SlidingParameters(first.nets, places, np.full(len(points), face), faces),
         points,
         vertex_quadrics(points, faces, TANGENTIAL),

@@ -11,11 +11,11 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..arrays import Array, IntArray, Knots
-from ..blocks.layout import BlockLayout, LayoutError
-from ..blocks.room import Room
 from ..checkpoint import Checkpoints
-from ..handles.cutting import without_handles
-from ..handles.layout import Footprint, footprint, stub_layout
+from ..layouts.rods.along_skeleton import BlockLayout, LayoutError
+from ..layouts.rods.clearance import Clearance
+from ..layouts.stubs.cutting import without_handles
+from ..layouts.stubs.stub_blocks import Footprint, footprint, stub_layout
 from ..optimization.endings import Course
 from ..optimization.reassignment import boundary_samples
 from ..progress import timed
@@ -93,7 +93,7 @@ def _with_stubs(task: Task, body: SplineMap, rims: list[tuple[Array, Array]]) ->
     """
     surface, most = task.surface, task.config.blocks
     ends = [(_footprint(body, first), _footprint(body, last)) for first, last in rims]
-    room = Room(task.skeleton, Solid(surface.unit_vertices, surface.faces))
+    room = Clearance(task.skeleton, Solid(surface.unit_vertices, surface.faces))
     layout, parts = stub_layout(body.volume, ends, task.handles, room)
     if most is not None and len(layout) > most:
         raise LayoutError(f"a body with stubs needs {len(layout)} blocks, and at most {most} are allowed: allow more")

@@ -4,7 +4,7 @@ import numpy as np
 
 from ..arrays import Array
 from ..optimization.least_squares import fit_pairs
-from ..optimization.surface_distance import SurfaceFit
+from ..optimization.surface_distance import Correspondence
 from ..spline.spline_map import SplineMap
 
 COARSE = 5 / 9  # of the spans a direction, in the first rounds: enough for the shape, at a fraction of the time
@@ -12,7 +12,7 @@ _BOUNDARY_SHARE = 0.2  # weight of the surface's samples; those inside have the 
 _FAIRNESS = 1e-7  # of the fit: determines coefficients without samples, and hardly moves the rest
 
 
-def first_spline(inside: Array, places: Array, fit: SurfaceFit) -> SplineMap:
+def first_spline(inside: Array, places: Array, fit: Correspondence) -> SplineMap:
     """Return the spline fitted by least squares to places (k, 3) and points (k, 3), and to the boundary.
 
     inside: the points in the solid. places: their places in the cube. fit: the points of the surface with their

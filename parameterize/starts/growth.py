@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 from ..arrays import Knots
 from ..checkpoint import Checkpoints
 from ..config import Config, scaled_steps
-from ..cube.layout import CubeLayout
+from ..cube.cube_layout import CubeLayout
 from ..optimization.endings import Reason
 from ..optimization.phases import Phase, Polish, Schedule, Separate, Unfold
 from ..optimization.state import State
@@ -51,14 +51,14 @@ class Growth(Start):
 
     turn: the turn of the cube; 0 is the best turn found, 1 the next best, and so on. far: a root mean square distance
     from the surface; a map farther away is given up once all data draw it, and a stiffer growth is tried beside this
-    one. firm: the number of rounds after which the surface's data give way at unproved spans. stiffness: the factor of
+    one. patience: the number of rounds after which the surface's data relax at unproved spans. stiffness: the factor of
     the fairness weight. least_floor: the smallest share to which the floors of det J are lowered in parts that are far
     thinner than the rest.
     """
 
     turn: int = 0
     far: float = 0.005
-    firm: int = 6
+    patience: int = 6
     stiffness: float = 1.0
     least_floor: float = 1.0
 
@@ -79,9 +79,9 @@ class Growth(Start):
         """Return the phases of the rounds: F grows in the first phase, under the full penalty on det J."""
         grown, steps = len(SHARES), scaled_steps(STEPS, config.steps_factor)
         phases = (
-            Grow(firm=self.firm, shares=SHARES, steps=steps),
-            Unfold(firm=self.firm, far=max(Unfold.far, self.far), far_first=self.far, first=grown + 1),
-            Separate(firm=self.firm, far=max(Separate.far, self.far)),
+            Grow(patience=self.patience, shares=SHARES, steps=steps),
+            Unfold(patience=self.patience, far=max(Unfold.far, self.far), far_first=self.far, first=grown + 1),
+            Separate(patience=self.patience, far=max(Separate.far, self.far)),
             Polish(),
         )
         return Schedule(phases, grown + config.spline.rounds + MORE_ROUNDS)
@@ -90,7 +90,7 @@ class Growth(Start):
 GROWTH = Growth("growth", "growth", "growing a map from a cube")
 # Where the first growth fails: far thinner parts keep their small det J, and squeezed parts do not buckle.
 STIFF = Growth(
-    "stiff growth", "growth", "growing a stiffer map", turn=1, far=0.01, firm=12, stiffness=10.0, least_floor=0.05
+    "stiff growth", "growth", "growing a stiffer map", turn=1, far=0.01, patience=12, stiffness=10.0, least_floor=0.05
 )
 # Where all else fails: a certified map that is far from the surface is worth more than none.
 LAST = replace(STIFF, name="last growth", doing="growing a stiffer map, farther from the surface,", turn=2, far=0.05)

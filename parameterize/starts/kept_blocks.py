@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..checkpoint import Checkpoints
-from ..skeleton.choice import Choice
+from ..layouts.skeleton.choice import Choice
+from ..spline.control_nets import ControlNets
 from ..spline.interface import Interface
-from ..spline.nets import Nets
 from ..spline.spline_map import SplineMap
 
 _CHECKPOINT = "first"
@@ -44,7 +44,7 @@ def _loaded(arrays: dict[str, NDArray[Any]], state: dict[str, Any]) -> SplineMap
     rows = np.split(arrays["knots"], np.cumsum(lengths.ravel())[:-1])
     knots = tuple((rows[k], rows[k + 1], rows[k + 2]) for k in range(0, len(rows), 3))
     interfaces = tuple(_interface(**values) for values in state["interfaces"])
-    return SplineMap(Nets(state["degree"], knots, interfaces), arrays["control"])
+    return SplineMap(ControlNets(state["degree"], knots, interfaces), arrays["control"])
 
 
 def _interface(first: list[Any], second: list[Any], swapped: bool, flipped: list[bool]) -> Interface:

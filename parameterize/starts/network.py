@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 from ..arrays import Array, IntArray
 from ..checkpoint import Checkpoints
 from ..config import SplineConfig
+from ..cube.cube_layout import CubeLayout
 from ..cube.edge_paths import PathError, choose_corners, lay_out
 from ..cube.flips import flipped, untangle
-from ..cube.layout import CubeLayout
 from ..optimization.phases import RAMP, Polish, Schedule, Separate, Shape, Unfold
 from ..progress import timed
 from ..surface.solid import Solid

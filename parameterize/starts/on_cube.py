@@ -6,8 +6,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from ..cube.cube import CORNERS, project_radially, snap
+from ..cube.cube_layout import CubeLayout
 from ..cube.cutting import cut_along_rays, subdivide_finely
-from ..cube.layout import CubeLayout
 from ..cube.turning import best_turn
 from .start import MOST_POINTS, Task
 

@@ -11,10 +11,10 @@ import numpy as np
 
 from ..checkpoint import Checkpoints
 from ..cube.boundary_map import on_faces
+from ..optimization.certified_map import CertifiedMap
 from ..optimization.endings import Course, Reason
-from ..optimization.optimized import Optimized
 from ..optimization.sliding import SlidingParameters
-from ..optimization.surface_distance import TANGENTIAL, SurfaceFit
+from ..optimization.surface_distance import TANGENTIAL, Correspondence
 from ..optimization.term import Weights
 from ..progress import timed
 from ..quality.distances import nearest_on_boundary
@@ -50,18 +50,18 @@ def kept(task: Task, first: SplineMap, why: Reason) -> Attempt:
     with timed(task.seconds, "fit"), one_blas_thread():
         fit = _surface_fit(task, first)
     with timed(task.seconds, "optimize"), one_blas_thread():
-        found = Optimized.of(first)
+        found = CertifiedMap.of(first)
     return Attempt(found, Course(Counter(), {}, why), fit, Weights())
 
 
-def _surface_fit(task: Task, first: SplineMap) -> SurfaceFit:
+def _surface_fit(task: Task, first: SplineMap) -> Correspondence:
     """Return the surface's vertices with their places on the blocks, in double precision."""
     points, faces = task.surface.to_unit(task.surface.vertices), task.surface.faces
     body = first.body
     patches, parameters, _ = nearest_on_boundary(points, body, SampledBoundary.of(body))
     outer = np.array([[name in names for name in FACE_NAMES] for names in body.outer])
     owners = 6 * patches + np.argmax(on_faces(parameters) & outer[patches], axis=1)
-    return SurfaceFit(
+    return Correspondence(
         SlidingParameters(first.nets, parameters, owners, faces),
         points,
         vertex_quadrics(points, faces, TANGENTIAL),

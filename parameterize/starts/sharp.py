@@ -10,10 +10,10 @@ from dataclasses import dataclass, replace
 from ..arrays import IntArray
 from ..checkpoint import Checkpoints
 from ..config import SplineConfig
-from ..cube.carried import OFF_RIDGES, Carried, carried, choose_sharp_corners
+from ..cube.constrained import OFF_RIDGES, Constrained, choose_sharp_corners, constrained
 from ..cube.cube import snap
+from ..cube.cube_layout import CubeLayout
 from ..cube.edge_paths import PathError, lay_out
-from ..cube.layout import CubeLayout
 from ..extension import extended
 from ..optimization.phases import Polish, Schedule, Separate, Shape, Unfold
 from ..progress import timed
@@ -56,7 +56,7 @@ def schedule(spline: SplineConfig) -> Schedule:
 SHARP = Sharp("sharp edges", "extension", "laying the cube's edges along sharp edges")
 
 
-def _along_ridges(task: Task) -> tuple[CubeLayout, Carried] | None:
+def _along_ridges(task: Task) -> tuple[CubeLayout, Constrained] | None:
     """Return the layout whose cube carries all sharp edges, and the points that stay on these; None where none does."""
     ridges = task.ridges
     assert ridges is not None  # else this start is not among those of the body
@@ -79,7 +79,7 @@ def _corners(layout: CubeLayout, ridges: Ridges, given: IntArray | None) -> list
     return [usual] if ridges.hold(layout.points[usual]).all() else [usual, farther]
 
 
-def _laid_out(layout: CubeLayout, corners: IntArray, ridges: Ridges) -> tuple[CubeLayout, Carried] | None:
+def _laid_out(layout: CubeLayout, corners: IntArray, ridges: Ridges) -> tuple[CubeLayout, Constrained] | None:
     """Return the layout with these corners (8,), and what the cube's edges carry; None where they find no paths."""
     try:
         laid = lay_out(layout, corners, ridges)
@@ -87,4 +87,4 @@ def _laid_out(layout: CubeLayout, corners: IntArray, ridges: Ridges) -> tuple[Cu
         _log.info("%s", error)
         return None
     laid = replace(laid, places=snap(laid.places))
-    return laid, carried(laid, ridges)
+    return laid, constrained(laid, ridges)

@@ -10,29 +10,29 @@ from typing import Any, Literal
 import numpy as np
 
 from ..arrays import Array, IntArray, in_brackets
-from ..blocks.layout import SPANS, BlockLayout, LayoutError, block_layout
 from ..checkpoint import Checkpoints
 from ..coarse import coarse_knots, optimize_coarse_first
-from ..columns.layout import Columns, columns_of
 from ..config import Config, SplineConfig
-from ..cube.carried import Carried
+from ..cube.constrained import Constrained
+from ..cube.cube_layout import CubeLayout
 from ..cube.cutting import subdivide_finely
-from ..cube.layout import CubeLayout
 from ..cube.sphere import lay_on_sphere
-from ..handles.pieces import Handle, handles_of
+from ..layouts.planes.exact_blocks import division_of, layout_of
+from ..layouts.rods.along_skeleton import SPANS, BlockLayout, LayoutError, block_layout
+from ..layouts.skeleton.choice import Choice, choose
+from ..layouts.skeleton.graph import Skeleton, SkeletonError
+from ..layouts.skeleton.solid import skeleton_of
+from ..layouts.stacks.stacked_blocks import Columns, columns_of
+from ..layouts.stubs.pieces import Handle, handles_of
+from ..optimization.certified_map import CertifiedMap
 from ..optimization.endings import Course
-from ..optimization.optimized import Optimized
 from ..optimization.phases import Schedule
 from ..optimization.reassignment import boundary_samples
 from ..optimization.sliding import SlidingParameters
-from ..optimization.surface_distance import TANGENTIAL, SurfaceFit
+from ..optimization.surface_distance import TANGENTIAL, Correspondence
 from ..optimization.term import Weights
-from ..polyhedra.layout import division_of, layout_of
 from ..progress import timed
-from ..skeleton.choice import Choice, choose
-from ..skeleton.graph import Skeleton, SkeletonError
-from ..skeleton.solid import skeleton_of
-from ..spline.nets import Nets
+from ..spline.control_nets import ControlNets
 from ..spline.spline_map import SplineMap
 from ..surface.features import features_of
 from ..surface.geometry import normals_and_areas, vertex_quadrics, vertex_weights
@@ -216,16 +216,16 @@ class Task:
         surface = self.surface
         return lay_on_sphere(surface.unit_vertices, surface.faces, self.report["progress"], self.checkpoints)
 
-    def fit(self, layout: CubeLayout, coarse: float, kept: Carried | None = None) -> SurfaceFit:
+    def fit(self, layout: CubeLayout, coarse: float, kept: Constrained | None = None) -> Correspondence:
         """Return the surface's points with their first parameters on the boundary of the cube (section 4.3.2, step 1).
 
         coarse: the number of spans a direction in the first rounds, as a share of that in the last rounds. kept:
         the points that slide along the cube's edges alone.
         """
         spline = self.config.spline
-        nets = Nets(spline.degree, (coarse_knots(spline, coarse),))
+        nets = ControlNets(spline.degree, (coarse_knots(spline, coarse),))
         faces, fixed = (None, None) if kept is None else (kept.faces, kept.fixed)
-        return SurfaceFit(
+        return Correspondence(
             SlidingParameters(nets, layout.places, faces, layout.faces, fixed),
             layout.points,
             vertex_quadrics(layout.points, layout.faces, TANGENTIAL),
@@ -243,9 +243,9 @@ def spans_across(control_points: int) -> int:
 class Attempt:
     """Hold a map, the course of its rounds, its surface data, and the weights of the energy for its refinement."""
 
-    found: Optimized
+    found: CertifiedMap
     course: Course
-    fit: SurfaceFit
+    fit: Correspondence
     weights: Weights
 
     @cached_property
@@ -287,7 +287,7 @@ class Start(ABC):
 
 def optimized(
     first: SplineMap,
-    fit: SurfaceFit,
+    fit: Correspondence,
     schedule: Schedule,
     task: Task,
     checkpoints: Checkpoints,

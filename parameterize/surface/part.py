@@ -92,7 +92,7 @@ class PartSurface(Brief):
         cells = np.unique(np.round(_ALIKE * given[aside]), axis=0, return_inverse=True)[1].ravel()
         for cell in range(cells.max(initial=-1) + 1):
             own = aside[cells == cell]
-            best[own] = self._facing(where[own], given[own], best[own])
+            best[own] = self._alignment(where[own], given[own], best[own])
         return best
 
     def _first(self, point: Array, reach: float, found: int) -> int:
@@ -101,7 +101,7 @@ class PartSurface(Brief):
         near = {int(t) for corner in self.faces[found] for t in around[starts[corner] : starts[corner + 1]]}
         return min((t for t in near if _distance(point, self.vertices, self.faces[t]) <= reach), default=found)
 
-    def _facing(self, points: Array, normals: Array, best: IntArray) -> IntArray:
+    def _alignment(self, points: Array, normals: Array, best: IntArray) -> IntArray:
         """Return the triangles (k,) near points (k, 3) that face as normals (k, 3), all much alike; else `best`."""
         middle = normals.mean(axis=0)
         rows = np.flatnonzero(self.normals @ (middle / np.linalg.norm(middle)) > 0.5 * ASIDE)

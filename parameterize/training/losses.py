@@ -37,7 +37,7 @@ class EdgePaths:
 
 
 @dataclass(frozen=True, eq=False)
-class BoundarySamples:
+class BoundaryData:
     """Hold the surface data of a stage: vertices (n, 3) at volume 1, triangles (m, 3), the sampler of the triangles.
 
     Later stages also have corners (8,), the vertices that go to the cube's corners; labels (m,), the cube face of each
@@ -60,7 +60,7 @@ class Objective:
     stencils: Stencils
 
     def __call__(
-        self, stage: Stage, boundary: BoundarySamples, generator: torch.Generator
+        self, stage: Stage, boundary: BoundaryData, generator: torch.Generator
     ) -> tuple[Tensor, int, dict[str, float]]:
         """Return the weighted sum of the terms (eq. (2), (3)), the number of folded stencils, the unweighted terms."""
         picks = boundary.sampler.draw(generator)
@@ -92,7 +92,7 @@ class Objective:
         total = torch.stack([weights[name] * term for name, term in terms.items()]).sum()
         return total, int((det <= 0.0).sum()), {name: float(term.detach()) for name, term in terms.items()}
 
-    def _goal(self, stage: Stage, boundary: BoundarySamples, surface: Tensor, picks: Tensor) -> Tensor:
+    def _goal(self, stage: Stage, boundary: BoundaryData, surface: Tensor, picks: Tensor) -> Tensor:
         """Return the goals (3 t, 3) of the corners of the mapped triangles `picks` (t,).
 
         Once the surface is cut, each triangle goes to its own face of the cube.
@@ -102,7 +102,7 @@ class Objective:
                 return nearest(stage.target, surface)
             return nearest_on_cube_face(surface, boundary.labels[picks].repeat_interleave(3))
 
-    def _held_terms(self, boundary: BoundarySamples, held: list[Tensor]) -> dict[str, Tensor]:
+    def _held_terms(self, boundary: BoundaryData, held: list[Tensor]) -> dict[str, Tensor]:
         """Return the terms of L_bound for the held vertices: the mapped corners (8, 3), then the path points (k, 3)."""
         terms = {}
         if boundary.corners is not None:

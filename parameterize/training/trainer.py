@@ -17,12 +17,12 @@ from torch import Tensor
 from ..arrays import Array, IntArray
 from ..checkpoint import Checkpoints
 from ..config import Config, StageConfig
+from ..cube.cube_layout import CubeLayout
 from ..cube.edge_paths import PathError, choose_corners, cut_surface, edge_targets
-from ..cube.layout import CubeLayout
-from ..cube.turning import best_turn, hollowness
+from ..cube.turning import best_turn, concavity
 from ..progress import History, Progress, ProgressCallback
 from ..surface.solid import Solid
-from .losses import BoundarySamples, EdgePaths, Objective
+from .losses import BoundaryData, EdgePaths, Objective
 from .network import InverseMap
 from .optimizer import TrainingOptimizer
 from .samples import TriangleSampler, stencils
@@ -32,7 +32,7 @@ _log = logging.getLogger(__name__)
 State = dict[str, Tensor]
 _CHECKPOINT, _CHECKPOINT_STEPS = "training", 100
 _COMPARED_STEPS = 8  # the last ones of a race, whose mean distortions are compared
-_RACE_GAIN = 0.05  # share by which the turned G must be better, first in hollowness and then in distortion
+_RACE_GAIN = 0.05  # share by which the turned G must be better, first in concavity and then in distortion
 
 
 @dataclass
@@ -121,7 +121,7 @@ class Trainer:
         """Return G at the surface's vertices, (n, 3), for the present network."""
         return self.map(self.vertices)
 
-    def _prepare(self, stage: StageConfig) -> BoundarySamples:
+    def _prepare(self, stage: StageConfig) -> BoundaryData:
         """Choose corners and cut the surface by the present network, in the stages that need them."""
         weights = STAGES[stage.name].weights
         if weights.cor > 0.0 and self.corners is None:
@@ -137,7 +137,7 @@ class Trainer:
             labels = self._index(surface.face_labels)
         sampler = TriangleSampler(vertices, faces, self.config.train.triangles, self.device)
         held = None if corners is None else self._index(corners)
-        return BoundarySamples(self._tensor(vertices), self._index(faces), sampler, held, labels, paths)
+        return BoundaryData(self._tensor(vertices), self._index(faces), sampler, held, labels, paths)
 
     def _index(self, numbers: IntArray) -> Tensor:
         return torch.as_tensor(numbers, device=self.device)
@@ -165,7 +165,7 @@ class Trainer:
             return None
         return next((number for number, stage in enumerate(self.config.stages) if stage.name == "cube"), None)
 
-    def _race(self, number: int, boundary: BoundarySamples) -> tuple[_Run, TrainingOptimizer]:
+    def _race(self, number: int, boundary: BoundaryData) -> tuple[_Run, TrainingOptimizer]:
         """Begin a stage twice, with G as it is and with G turned by the best turn of the cube; keep the better run.
 
         The turn puts the cube's edges out of hollows; without such a turn the stage begins once. Returns the better run
@@ -178,8 +178,8 @@ class Trainer:
         directions = away / np.maximum(np.linalg.norm(away, axis=1, keepdims=True), 1e-300)
         ball = CubeLayout(self.vertices, self.faces, directions, len(self.vertices))
         turn = best_turn(ball, np.random.default_rng(self.seed))
-        as_it_is = hollowness(ball)
-        if hollowness(replace(ball, places=ball.places @ turn.T)) > as_it_is - _RACE_GAIN * abs(as_it_is):
+        as_it_is = concavity(ball)
+        if concavity(replace(ball, places=ball.places @ turn.T)) > as_it_is - _RACE_GAIN * abs(as_it_is):
             return _Run(number, 0, start, start), TrainingOptimizer(self.network, train)
         least, winner = math.inf, None
         for rotation, share in ((np.eye(3), 1.0), (turn, 1.0 - _RACE_GAIN)):
@@ -199,7 +199,7 @@ class Trainer:
         self.history.rows += rows
         return run, optimizer
 
-    def _train(self, run: _Run, boundary: BoundarySamples, optimizer: TrainingOptimizer) -> None:
+    def _train(self, run: _Run, boundary: BoundaryData, optimizer: TrainingOptimizer) -> None:
         """Train one stage, and leave the network at its best state: the fewest folded samples, then the lowest loss."""
         steps = self.config.stages[run.number].steps
         try:
@@ -211,7 +211,7 @@ class Trainer:
             raise
         self.network.load_state_dict(run.best)
 
-    def _steps(self, run: _Run, boundary: BoundarySamples, optimizer: TrainingOptimizer, until: int) -> Iterator[None]:
+    def _steps(self, run: _Run, boundary: BoundaryData, optimizer: TrainingOptimizer, until: int) -> Iterator[None]:
         """Take the steps of a stage up to the step `until`, and report each step."""
         stage = self.config.stages[run.number]
         later = sum(stage.steps for stage in self.config.stages[run.number + 1 :])
@@ -224,7 +224,7 @@ class Trainer:
             self.progress(Progress(stage.name, run.step, stage.steps, loss, folded, left, self.mapped))
             yield
 
-    def _step(self, run: _Run, stage: StageConfig, boundary: BoundarySamples, optimizer: TrainingOptimizer) -> None:
+    def _step(self, run: _Run, stage: StageConfig, boundary: BoundaryData, optimizer: TrainingOptimizer) -> None:
         """Take one step of the optimiser; the state changes only once the loss is known to be finite."""
         self.generator.manual_seed((1_000_003 * self.seed + 100_003 * run.number + run.step) % 2**63)
         optimizer.clear()

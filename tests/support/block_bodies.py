@@ -4,12 +4,12 @@ from itertools import permutations, product
 
 import numpy as np
 
-from parameterize.blocks.layout import Block, BlockLayout
+from parameterize.layouts.rods.along_skeleton import Block, BlockLayout
 from parameterize.optimization.reassignment import reassign
 from parameterize.optimization.sliding import SlidingParameters
-from parameterize.optimization.surface_distance import TANGENTIAL, SurfaceFit
+from parameterize.optimization.surface_distance import TANGENTIAL, Correspondence
 from parameterize.spline.bspline import greville, open_uniform_knots
-from parameterize.spline.nets import Nets
+from parameterize.spline.control_nets import ControlNets
 from parameterize.spline.sampled_boundary import SampledBoundary
 from parameterize.spline.spline_map import SplineMap
 from parameterize.surface.geometry import vertex_quadrics, vertex_weights
@@ -24,7 +24,7 @@ TURNS = [
 def uniform_nets(*spans, interfaces=(), degree=3):
     """Nets of blocks with so many spans (n_u, n_v, n_w) each, on uniform knots."""
     knots = tuple(tuple(open_uniform_knots(degree + n, degree) for n in each) for each in spans)
-    return Nets(degree, knots, tuple(interfaces))
+    return ControlNets(degree, knots, tuple(interfaces))
 
 
 def map_of(layout):
@@ -50,7 +50,7 @@ def surface_fit(spline, points, faces):
     parameters[:, face % 6 // 2] = face % 2
     places = SlidingParameters(spline.nets, parameters, np.full(len(points), face), faces)
     quadrics = vertex_quadrics(points, faces, TANGENTIAL)
-    fit = SurfaceFit(places, points, quadrics, vertex_weights(points, faces, len(points)))
+    fit = Correspondence(places, points, quadrics, vertex_weights(points, faces, len(points)))
     reassign(fit, spline.control, first=True)
     return fit
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pyvista
 
-from parameterize.blocks.layout import Block, BlockLayout
+from parameterize.layouts.rods.along_skeleton import Block, BlockLayout
 from parameterize.surface.geometry import signed_volume
 
 SECTIONS = 13  # of a quarter of the torus; of each handle of the double torus twice as many

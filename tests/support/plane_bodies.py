@@ -3,7 +3,7 @@
 import numpy as np
 from manifold3d import CrossSection, Manifold
 
-from parameterize.polyhedra.layout import hexahedra_of, layout_of
+from parameterize.layouts.planes.exact_blocks import hexahedra_of, layout_of
 
 
 def box(low, high):

@@ -8,7 +8,7 @@ import numpy as np
 import pyvista
 from scipy.spatial import cKDTree
 
-from parameterize.skeleton.graph import Branch, Skeleton
+from parameterize.layouts.skeleton.graph import Branch, Skeleton
 from parameterize.spline.body import shared_numbers
 from parameterize.spline.interface import face_layer
 from parameterize.spline.volume import FACE_NAMES

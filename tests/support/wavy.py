@@ -4,13 +4,13 @@ import numpy as np
 
 from parameterize.cube.cube import nearest_faces
 from parameterize.spline.bspline import greville, open_uniform_knots
-from parameterize.spline.nets import Nets
+from parameterize.spline.control_nets import ControlNets
 from parameterize.spline.volume import BSplineVolume
 from parameterize.training.target_shapes import nearest_places
 
 DEGREE = 3
 KNOTS = (open_uniform_knots(6, DEGREE), open_uniform_knots(5, DEGREE), open_uniform_knots(7, DEGREE))
-NETS = Nets(DEGREE, (KNOTS,))
+NETS = ControlNets(DEGREE, (KNOTS,))
 
 
 def wavy_control(amplitude=0.02):

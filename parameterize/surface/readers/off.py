@@ -18,7 +18,7 @@ HEADER = re.compile(r"(ST)?(C)?(N)?(4)?(n)?OFF")
 
 
 @dataclass
-class Words:
+class OffWords:
     """The words of a text, read up to number `at`; lines[k] is the line of word k."""
 
     words: list[str]
@@ -47,7 +47,7 @@ class Words:
 def read_off(data: bytes, max_faces: int) -> Content:
     """Read an OFF, COFF, NOFF or STOFF text, or a mixture of these; comments are skipped."""
     rows = [(number, line.split("#", 1)[0].split()) for number, line in enumerate(text_lines(data), 1)]
-    words = Words([word for _, row in rows for word in row], [number for number, row in rows for _ in row])
+    words = OffWords([word for _, row in rows for word in row], [number for number, row in rows for _ in row])
     besides = _header(words)
     n, m = _counts(words)
     check_face_count(m, max_faces)
@@ -74,7 +74,7 @@ def read_off(data: bytes, max_faces: int) -> Content:
     raise failure or MeshError(f"the OFF holds no face; {DAMAGED}")
 
 
-def _header(words: Words) -> int:
+def _header(words: OffWords) -> int:
     """Read the keyword; return how many words follow the coordinates of a vertex."""
     keyword = words.words[0] if words.words else ""
     header = HEADER.match(keyword if "nOFF" in keyword else keyword.upper())
@@ -90,7 +90,7 @@ def _header(words: Words) -> int:
     return 2 * bool(header[1]) + 4 * bool(header[2]) + 3 * bool(header[3])
 
 
-def _counts(words: Words) -> tuple[int, int]:
+def _counts(words: OffWords) -> tuple[int, int]:
     """Read the numbers of vertices, of faces, and of edges, which some programs leave out at the end of the line."""
     if len(words.words) < words.at + 2:
         raise MeshError(f"the OFF lacks the counts of vertices and faces; {DAMAGED}")
@@ -101,7 +101,7 @@ def _counts(words: Words) -> tuple[int, int]:
     return n, m
 
 
-def _vertex(words: Words, besides: int | None) -> list[float]:
+def _vertex(words: OffWords, besides: int | None) -> list[float]:
     """Read a vertex and skip `besides` further words, or with None the rest of its line."""
     line = words.place()
     found = coordinates(words.next(3), line)
@@ -112,7 +112,7 @@ def _vertex(words: Words, besides: int | None) -> list[float]:
     return found
 
 
-def _face(words: Words, *, with_colour: bool) -> list[int]:
+def _face(words: OffWords, *, with_colour: bool) -> list[int]:
     """Read a face `n i_1 ... i_n`; with a colour, skip the rest of its line."""
     line, size = words.place(), words.next(1)[0]
     if not size.isdecimal() or len(size) > 3:

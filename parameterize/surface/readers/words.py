@@ -13,7 +13,7 @@ Columns = Sequence[tuple[str, int]]  # of a table: numpy's name of the type, and
 
 
 class Text:
-    """Words; `what` names their section in messages."""
+    """OffWords; `what` names their section in messages."""
 
     def __init__(self, content: bytes, what: str) -> None:
         self._words = content.decode("latin-1").split()
