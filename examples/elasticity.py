@@ -33,7 +33,7 @@ def main(out: str | Path = "out/elasticity") -> Path:
     """Print the tip's displacement beside beam theory; returns the picture of the bent beam."""
     volume = beam()
     free = dict.fromkeys(("u1", "v0", "v1", "w0", "w1"), ("0", "0", "0"))
-    problem = iga_nn.Elasticity(force=("0", "0", str(-WEIGHT)), traction=free, young=YOUNG, poisson_ratio=0.3)
+    problem = iga_nn.Elasticity(body_force=("0", "0", str(-WEIGHT)), traction=free, young=YOUNG, poisson_ratio=0.3)
     solution = iga_nn.solve(volume, problem, refine=2)
     print(solution.report)
     tip = solution(np.array([[1.0, 0.5, 0.5]]))[0, 2]

@@ -44,7 +44,7 @@ def main(file: str | Path | None = None, out: str | Path = "out/thermal_stress")
     volume = iga_nn.load_volume(file) if file else beam(8).refined()
     heat = iga_nn.Poisson(source="0", neumann=dict.fromkeys(FREE, "0") | {"u1": str(FLOW)})
     temperature = iga_nn.solve(volume, heat).field
-    body = iga_nn.Elasticity(force=NOTHING, traction=dict.fromkeys(FREE, NOTHING), young=YOUNG, poisson_ratio=NU)
+    body = iga_nn.Elasticity(body_force=NOTHING, traction=dict.fromkeys(FREE, NOTHING), young=YOUNG, poisson_ratio=NU)
     system = iga_nn.discretize(volume, body)
     four = iga_nn.Problem(Coupling(), source=("0",) * 4, neumann=dict.fromkeys(FREE, ("0",) * 4))
     coupling = iga_nn.discretize(volume, four)

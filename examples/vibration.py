@@ -32,7 +32,7 @@ NOTHING = ("0", "0", "0")
 def main(file: str | Path | None = None, out: str | Path = "out/vibration") -> Path:
     """Print frequencies and residuals; returns the picture of the first mode."""
     volume = iga_nn.load_volume(file) if file else beam(8).refined()
-    body = iga_nn.Elasticity(force=NOTHING, traction=dict.fromkeys(FREE, NOTHING), young=YOUNG)
+    body = iga_nn.Elasticity(body_force=NOTHING, traction=dict.fromkeys(FREE, NOTHING), young=YOUNG)
     found = iga_nn.modes(volume, body, density=1.0, n=4)
     for frequency, residual in zip(found.frequencies, found.residuals, strict=True):
         print(f"frequency {frequency:.5g}  relative residual {residual:.1e}")

@@ -25,6 +25,7 @@ from solve import modes as modes
 from solve import newton as newton
 from solve import resultant as resultant
 from solve import solve_problem
+from solve.forms.conditions import *
 
 from .batch.run_batch import run_batch as run_batch
 from .errors import InputError as InputError

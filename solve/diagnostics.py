@@ -179,9 +179,9 @@ def contradictions(volume: BSplineVolume, problem: BoundaryValueProblem) -> list
         # rounding is measured by the terms of the law, which may cancel in the source
         if not _agree(problem.source_at(x), lambda: (problem.source_of_exact(x), problem.size_of_exact(x))):
             found.append(f"{problem.label('source')} is not that of exact: {TWO_PROBLEMS}")
-    if "boundary" in problem.data and not all(_values_fit(volume, problem, face) for face in problem.dirichlet):
-        found.append(f"{problem.label('boundary')} differs from exact: {TWO_PROBLEMS}")
-    return found
+    strong = [(face, condition) for face in problem.dirichlet if (condition := problem.strong_on(face))]
+    wrong = [one.role for face, one in strong if one.datum and not _values_fit(volume, problem, face)]
+    return [*found, *(f"{role} differs from exact: {TWO_PROBLEMS}" for role in dict.fromkeys(wrong))]
 
 
 def _values_fit(volume: BSplineVolume, problem: BoundaryValueProblem, face: str) -> bool:

@@ -15,10 +15,9 @@ from parameterize.spline.volume import BSplineVolume
 from .discretization.space import TrialSpace, same_smoothness
 from .discretization.surface_rule import SurfaceRule, surface_rule
 from .field import Points
-from .forms.condition import Regions
 from .forms.form import Quantity
 from .forms.frame import UnitFrame
-from .forms.region import Region, regions_of
+from .forms.region import Region, Regions, regions_of
 from .quantities import at_points, grid_values, quantity_of, slabs
 from .solution import MultiPatchSolution, Solution
 

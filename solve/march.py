@@ -223,7 +223,7 @@ class _Data:
         return self._found(self.placed, 0.0)
 
     def _found(self, problem: BoundaryValueProblem, time: float) -> tuple[Array, Array]:
-        if (problem.dirichlet, problem.natural) != (self.placed.dirichlet, self.placed.natural):
+        if problem.places != self.placed.places:
             raise ValueError(f"the problem of time {time:g} has data on other faces than that of the first time")
         given = problem.on(self.volume)
         _, load, known = assemble_data(self.volume, given, self.space, self.options)

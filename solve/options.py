@@ -80,7 +80,7 @@ def check_device(device: str, problem: BoundaryValueProblem) -> None:
     if device != "cpu":
         if not isinstance(problem, Poisson):
             raise ValueError(f"{type(problem).__name__.lower()} runs on device='cpu' only, got device={device!r}")
-        if problem.robin:
+        if any(condition.factor is not None for condition in problem.faces):
             raise ValueError(f"Robin faces run on device='cpu' only, got device={device!r}")
         if problem.conditions:
             raise ValueError(f"regions run on device='cpu' only, got device={device!r}")

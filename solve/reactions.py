@@ -16,7 +16,6 @@ from .discretization.unknowns import Unknowns
 from .discretization.weak import WeakFace
 from .field import Points
 from .forms.boundary_value_problem import BoundaryValueProblem
-from .forms.condition import WITH_FACTOR
 from .patch_system import PatchSystem
 
 CANCELLED = 1e-9  # share of all parts of the forces below which the forces are rounding: each balances itself
@@ -119,7 +118,8 @@ def _of_faces(patches: Sequence[PatchSystem], residuals: Sequence[Array]) -> dic
             here &= ~fixed
             fixed |= here
             force = space.total((residual * here)[:, space.own].sum(axis=(1, 2, 3)))
-            role = patch.problem.strong_role(name) or patch.problem.prefix + name
+            support = patch.problem.strong_on(name)
+            role = patch.problem.prefix + name if support is None or support.name else support.role
             found[role] = found.get(role, 0.0) + force
     return found
 
@@ -134,11 +134,7 @@ def _has_end(space: TrialSpace, name: str) -> bool:
 
 def _supports(problem: BoundaryValueProblem) -> dict[str, Array]:
     """Return zero for each support on a region, by its role."""
-    return {
-        c.role: np.zeros(problem.form.components)
-        for c in problem.conditions
-        if (c.is_essential and not c.is_strong) or c.kind in WITH_FACTOR
-    }
+    return {c.role: np.zeros(problem.form.components) for c in problem.conditions if c.is_support and not c.is_strong}
 
 
 def _add_regions(
@@ -153,12 +149,12 @@ def _add_regions(
             if condition.is_essential and condition.role in found:
                 found[condition.role] += face.force(coefficients, here & ~taken)
                 taken |= here
-            elif condition.kind in WITH_FACTOR and here.any():
+            elif condition.factor is not None and here.any():
                 chosen = np.flatnonzero(here)
                 x = Points.at(np.ascontiguousarray(face.x[:, chosen]), face.x.places[chosen])  # type: ignore[index]
                 free = np.eye(len(coefficients))[:, :, None] - face.projector[:, :, chosen]
-                given = problem.flux_on(condition, x, face.normal[:, chosen])
-                pull = problem.factor_on(condition, x) * face.traces(coefficients)[0][:, chosen]
+                given = condition.flux_at(problem, x, face.normal[:, chosen])
+                pull = condition.factor_at(x) * face.traces(coefficients)[0][:, chosen]
                 weights = face.weights[chosen]
                 found[condition.role] += (weights * np.einsum("cdm,dm->cm", free, given - pull)).sum(axis=1)
                 outside += (weights * np.einsum("cdm,dm->cm", free, given)).sum(axis=1)

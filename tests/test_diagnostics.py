@@ -59,7 +59,7 @@ def test_data_of_a_face_are_judged_there(data):
     """The flux is 1 at a corner of u1, where it does not act, and underflows on u0, where it does."""
     report, notices = said(MILLIMETRES, Poisson(source="1", **data))
     assert f"{FLUX!r} runs from 0 to 0 on face u0: it underflows" in notices and report.meaningful
-    body = Elasticity(force=("0", "0", "1"), traction={"u0": (FLUX, "0", "0")})
+    body = Elasticity(body_force=("0", "0", "1"), traction={"u0": (FLUX, "0", "0")})
     assert f"traction u0 {FLUX!r} runs from 0 to 0" in " ".join(solve_problem(MILLIMETRES, body).report.notices)
 
 
@@ -163,13 +163,15 @@ def test_data_that_contradict_the_exact_solution_are_named(data, notice):
 
 
 def test_force_and_displacement_that_contradict_are_named():
-    body = Elasticity(exact=("x*x", "y", "0"), force=("1", "0", "0"), displacement=("x", "y", "0"))
+    body = Elasticity(exact=("x*x", "y", "0"), body_force=("1", "0", "0"), displacement=("x", "y", "0"))
     notices = solve_problem(VOLUME, body).report.notices
     assert notices == (
-        f"force is not that of exact: {TWO_PROBLEMS}",
+        f"body_force is not that of exact: {TWO_PROBLEMS}",
         f"displacement differs from exact: {TWO_PROBLEMS}",
     )
-    fits = Elasticity(exact=("x*x", "y", "0"), force=(str(-2.0 * 3.5 / 2.6), "0", "0"))  # -2 (lambda + 2 mu), nu = 0.3
+    fits = Elasticity(
+        exact=("x*x", "y", "0"), body_force=(str(-2.0 * 3.5 / 2.6), "0", "0")
+    )  # -2 (lambda + 2 mu), nu = 0.3
     assert contradictions(VOLUME, fits) == []
 
 
@@ -245,6 +247,6 @@ def test_spans_that_are_much_longer_than_the_body_is_thick_are_named(coarse, fin
 
 
 def test_short_bodies_and_other_laws_are_not_said_to_be_slender():
-    assert said(UNIT, Elasticity(force=("0", "0", "1"), displacement=("0", "0", "0")))[1] == ""
+    assert said(UNIT, Elasticity(body_force=("0", "0", "1"), displacement=("0", "0", "0")))[1] == ""
     foil = BSplineVolume.from_function(lambda u, v, w: (u, v, 1e-4 * w), 5)
     assert "thick" not in said(foil, Poisson(source="1", boundary="0"))[1]

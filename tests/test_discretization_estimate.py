@@ -103,7 +103,7 @@ def true_error(volume, coarse, problem, parts, layers):
 LOAD = Poisson(source="1")
 FREE_ENDS = Poisson(source="1", neumann={"u0": "0", "u1": "0"})
 FREE_SIDES = Poisson(source="1", neumann=dict.fromkeys(("u0", "u1", "v0", "v1"), "0"))
-FORCE = Elasticity(force=("1", "1", "1"))
+FORCE = Elasticity(body_force=("1", "1", "1"))
 
 
 class Wind(Form):
@@ -172,7 +172,7 @@ def test_estimate_is_near_the_true_error_of_a_stretched_body(name):
 def test_a_beam_that_is_too_stiff_is_noticed(spans, length):
     """Bent by a force at its end a beam 1 x 1 sinks by 4 F l^3 / E; a coarse mesh misses a share of that."""
     free = dict.fromkeys(("v0", "v1", "w0", "w1"), ("0", "0", "0"))
-    pulled = Elasticity(force=("0", "0", "0"), traction={**free, "u1": ("0", "0", "1")})
+    pulled = Elasticity(body_force=("0", "0", "0"), traction={**free, "u1": ("0", "0", "1")})
     found = solve_problem(box((length, 1, 1), spans), pulled, tolerance=1e-12)
     missing = 1.0 - found([[1.0, 0.5, 0.5]])[0, 2] / (4.0 * length**3)
     assert missing > 0.02 and 0.3 < found.report.error_estimate_relative / missing < 5.0

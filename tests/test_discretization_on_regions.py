@@ -5,6 +5,7 @@ import pytest
 from volumes import mapped
 
 import iga_nn
+from iga_nn import Flux
 from parameterize.spline.volume import FACE_NAMES, BSplineVolume
 from solve import Elasticity, Form, Poisson, Problem, benchmark_volume, discretize, solve_problem
 
@@ -85,7 +86,9 @@ def test_a_law_of_ones_own_without_symmetry_is_held_on_a_region(coarse_regions):
 
 def test_an_exchange_and_an_inflow_on_regions_are_those_of_faces():
     on_faces = Poisson(source="1", boundary="2", neumann={"u1": "x"}, robin={"v0": ("3", "6"), **{}})
-    free = Poisson(source="1", value={"u0 or v1 or w0 or w1": "2"}, inflow={"u1": "x"}, exchange={"v0": ("3", "2")})
+    free = Poisson(
+        source="1", value={"u0 or v1 or w0 or w1": "2"}, conditions=[Flux("u1", "x")], exchange={"v0": ("3", "2")}
+    )
     one, other = (solve_problem(TWISTED, problem, refine=1) for problem in (on_faces, free))
     assert one.coefficients == pytest.approx(other.coefficients, abs=1e-7)
 
@@ -102,7 +105,7 @@ def test_a_pressure_acts_against_the_normal_and_a_spring_pulls_back():
     [{"fix": "u0"}, {"fix": "x < 0.31"}, {"fix": {"u0": (0, 0, 0), "nx > 0.5 and z > 0.4": (0, None, 0.01)}}],
 )
 def test_reactions_balance_what_acts_on_the_body(supports, coarse_regions):
-    law = Elasticity(force=(0, 0, -1), load={"nz > 0.5 and x > 2": (0, "x", 0)}, young=100.0, **supports)
+    law = Elasticity(body_force=(0, 0, -1), load={"nz > 0.5 and x > 2": (0, "x", 0)}, young=100.0, **supports)
     found = solve_problem(BAR, law).report.balance
     assert found.load == pytest.approx((0.0, 6.0, -4.0), abs=1e-9)
     assert np.sum([found.load, *found.reactions.values()], axis=0) == pytest.approx(0.0, abs=1e-8)
@@ -125,7 +128,7 @@ def test_heat_that_comes_in_goes_out(coarse_regions):
         ({"roller": ["nx < -0.5", "ny < -0.5"], "load": {"u1": (1, 0, 0)}}, r"\(0, 0, -?1, 0, 0, 0\) is not held"),
         ({"fix": {"x < 1": (0, 0, 0), "x < 2": (1, 0, 0)}}, "overlap and contradict each other at"),
         ({"fix": "u0", "displacement": (0, 0, 0)}, "not both"),
-        ({"fix": "u0", "load": {"u1": None}}, "load 'u1': has no data"),
+        ({"fix": "u0", "load": {"u1": None}}, "load 'u1' has no data"),
         ({"fix": {"u0": (None, None, None)}}, "gives no component"),
         ({"fix": "u0", "spring": {"x > 3": -1.0}}, "must be zero or positive"),
     ],

@@ -86,7 +86,7 @@ def test_bar_in_tension_by_hand():
     bar = BSplineVolume.uniform(np.stack(np.meshgrid(points, points, points, indexing="ij"), axis=-1), 2)
     pull = {"u1": ("1", "0", "0"), **dict.fromkeys(("v0", "v1", "w0", "w1"), ("0", "0", "0"))}
     problem = Elasticity(
-        force=("0", "0", "0"),
+        body_force=("0", "0", "0"),
         displacement=("0", "-y/8", "-z/8"),
         traction=pull,
         young=2.0,
@@ -139,9 +139,9 @@ def test_lame_constants_by_hand():
 
 
 def test_functions_as_data_agree_with_formulas():
-    formulas = Elasticity(force=("x", "0", "1"), displacement=("y", "0", "0"), traction={"u1": ("0", "z", "0")})
+    formulas = Elasticity(body_force=("x", "0", "1"), displacement=("y", "0", "0"), traction={"u1": ("0", "z", "0")})
     functions = Elasticity(
-        force=(lambda x, y, z: x, lambda x, y, z: 0, lambda x, y, z: 1.0),
+        body_force=(lambda x, y, z: x, lambda x, y, z: 0, lambda x, y, z: 1.0),
         displacement=(lambda x, y, z: y, lambda x, y, z: 0, lambda x, y, z: 0),
         traction={"u1": (lambda x, y, z: 0, lambda x, y, z: z, lambda x, y, z: 0)},
     )
@@ -171,7 +171,7 @@ def test_no_convergence_is_raised_on_request():
         ({"exact": "x"}, "three entries"),
         ({"exact": ("x", "y")}, "three entries"),
         ({"exact": ("x", "y", "q")}, "exact: expression"),
-        ({"force": WAVE, "traction": {"u0": None}}, "traction u0 has no data"),
+        ({"body_force": WAVE, "traction": {"u0": None}}, "traction u0 has no data"),
         ({"exact": WAVE, "traction": {"top": None}}, "no face of the cube"),
     ],
 )
@@ -188,7 +188,9 @@ def test_a_free_body_is_refused_before_it_is_solved():
 
 
 def test_vectors_may_be_arrays():
-    one, two = (Elasticity(force=force, displacement=np.zeros(3)) for force in (np.array([0.0, 0.0, 1.0]), [0, 0, 1]))
+    one, two = (
+        Elasticity(body_force=force, displacement=np.zeros(3)) for force in (np.array([0.0, 0.0, 1.0]), [0, 0, 1])
+    )
     volume = benchmark_volume(2)
     assert np.array_equal(solve_problem(volume, one).coefficients, solve_problem(volume, two).coefficients)
 

@@ -95,7 +95,7 @@ def test_the_factor_is_finite_whatever_faces_are_free(count):
     """Without a shift most factors of this map have no positive pivots, and some get numbers that are not finite."""
     body = mapped(lambda u, v, w: (u + 3.0 * v * v + 3.0 * w, v + 4.0 * w * w, 0.2 * w), (7, 7, 7))
     for free in combinations(FACE_NAMES, count):
-        load = Elasticity(force=("0", "0", "-1"), traction=dict.fromkeys(free, ("0", "0", "0")))
+        load = Elasticity(body_force=("0", "0", "-1"), traction=dict.fromkeys(free, ("0", "0", "0")))
         for block in discretize(body, load, threads=1).blocks:
             assert block.local is not None and not block.weakness
             residual = np.random.default_rng(3).standard_normal(block.scaling.shape)

@@ -73,7 +73,7 @@ def test_energy_only_decays_and_heat_is_kept_by_insulation(scheme):
 def test_vectors_and_laws_that_are_not_symmetric():
     """Elastic creep toward the solution at rest; and a wind, which GMRES solves."""
     volume = benchmark_volume(2)
-    body = iga_nn.Elasticity(force=("0", "0", "-1"), young=10.0)
+    body = iga_nn.Elasticity(body_force=("0", "0", "-1"), young=10.0)
     last = iga_nn.march(volume, body, ("0", "0", "0"), dt=0.5, steps=8).fields[-1]
     assert np.allclose(last.coefficients, iga_nn.solve(volume, body).coefficients, atol=1e-6)
 

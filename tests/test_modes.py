@@ -19,7 +19,7 @@ def box(a, b, c, n):
 
 
 def body(free=FACES[1:], young=100.0):
-    return iga_nn.Elasticity(force=NOTHING, traction=dict.fromkeys(free, NOTHING), young=young, poisson_ratio=0.0)
+    return iga_nn.Elasticity(body_force=NOTHING, traction=dict.fromkeys(free, NOTHING), young=young, poisson_ratio=0.0)
 
 
 def tones(first):
@@ -85,9 +85,12 @@ def test_density_and_units():
     volume = box(2.0, 1.0, 1.0, (6, 4, 4))
     light = iga_nn.modes(volume, body(young=2e11), 7800.0, n=2)
     moved = iga_nn.Elasticity(
-        force=("0", "0", "-1"), displacement=("1", "2", "3"), traction=dict.fromkeys(FACES[1:], NOTHING), young=2e11,
+        body_force=("0", "0", "-1"),
+        displacement=("1", "2", "3"),
+        traction=dict.fromkeys(FACES[1:], NOTHING),
+        young=2e11,
         poisson_ratio=0.0,
-    )  # fmt: skip
+    )
     heavy = iga_nn.modes(volume, moved, 15600.0, n=2)
     assert heavy.frequencies == pytest.approx(light.frequencies / np.sqrt(2.0), rel=1e-8)
     assert np.abs(heavy.shapes[0].grid([0.0], [0.3, 0.6], [0.2])).max() < 1e-15

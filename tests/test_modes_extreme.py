@@ -71,7 +71,7 @@ def test_a_stiff_bar_on_a_soft_one_is_a_mass(contrast):
     """A mass m at the end of a bar of length l: tan(k l) = -k m, with k = omega / sqrt(kappa)."""
     mass, length = (0.5, 1.0) if contrast > 1.0 else (1.0, 0.5)
     started = time.monotonic()
-    found = iga_nn.modes(bars(), Poisson(kappa={0: contrast, 1: 1.0}, inflow={"x > -1": 0.0}), n=3)
+    found = iga_nn.modes(bars(), Poisson(kappa={0: contrast, 1: 1.0}, conditions=[iga_nn.Flux("x > -1", 0.0)]), n=3)
     assert found.rigid == 1 and time.monotonic() - started < 30.0
     k = brentq(lambda k: np.sin(k * length) + k * mass * np.cos(k * length), 0.51 * np.pi / length, np.pi / length)
     assert found.frequencies[0] == pytest.approx(k * min(contrast, 1.0) ** 0.5 / CIRCLE, rel=3e-3)

@@ -85,8 +85,8 @@ def test_an_affine_deformation_is_exact_under_loads_on_regions():
     gradient = np.array([[0.3, 0.1, 0.0], [0.0, -0.2, 0.2], [0.05, 0.0, 0.1]])
     law, f = neo_hookean(), np.eye(3) + gradient
     piola = law.shear * f + (law.first * np.log(np.linalg.det(f)) - law.shear) * np.linalg.inv(f).T
-    loads = {"nx > 0.99": piola[:, 0].tolist(), "ny < -0.99": (-piola[:, 1]).tolist()}
-    problem = iga_nn.Problem(law, exact=exact, source=NOTHING, value="u0 or v1 or w0 or w1", inflow=loads)
+    loads = [iga_nn.Flux("nx > 0.99", piola[:, 0].tolist()), iga_nn.Flux("ny < -0.99", (-piola[:, 1]).tolist())]
+    problem = iga_nn.Problem(law, exact=exact, source=NOTHING, value="u0 or v1 or w0 or w1", conditions=loads)
     found = iga_nn.newton(wavy_box(), problem, degree=3, quadrature="gauss+1", tolerance=1e-13)
     assert found.report.l2 < 1e-10 and found.report.h1_seminorm < 1e-10
 
@@ -191,9 +191,15 @@ def thawing(**conditions):
     "conditions",
     [
         {"value": {"u0": 0, "u1": 1}},
-        {"value": {"u0": 0}, "inflow": {"nx > 0.99": 0.375}},
-        {"value": {"u0": 0}, "inflow": {"nx > 0.99 and y < 0.5": 0.375, "nx > 0.99 and y > 0.5": 0.375}},
-        {"value": {"u0": 0}, "inflow": {"nx > 0.99": 0.3, "u1": 0.075}},
+        {"value": {"u0": 0}, "conditions": [iga_nn.Flux("nx > 0.99", 0.375)]},
+        {
+            "value": {"u0": 0},
+            "conditions": [
+                iga_nn.Flux("nx > 0.99 and y < 0.5", 0.375),
+                iga_nn.Flux("nx > 0.99 and y > 0.5", 0.375),
+            ],
+        },
+        {"value": {"u0": 0}, "conditions": [iga_nn.Flux("nx > 0.99", 0.3), iga_nn.Flux("u1", 0.075)]},
         {"value": {"u0": 0}, "exchange": {"nx > 0.99": (0.375, 2)}},
     ],
     ids=["values", "inflow", "two halves", "overlap", "exchange"],
@@ -206,10 +212,10 @@ def test_data_on_regions_give_the_solution_of_a_bar(conditions):
 @pytest.mark.parametrize(
     ("conditions", "says"),
     [
-        ({"value": {"u0": 0}, "inflow": {"x > 9": 1}}, "flux 'x > 9': no part of the boundary lies there"),
+        ({"value": "u0", "conditions": [iga_nn.Flux("x > 9", 1)]}, "flux 'x > 9': no part of the boundary lies there"),
         ({"value": {"u0": 0}, "exchange": {"x > 9": (1, 2)}}, "exchange 'x > 9': no part of the boundary lies there"),
-        ({"value": {"u0": 0}, "inflow": {"nx < -0.99": 1}}, "flux 'nx < -0.99': no part of the boundary lies there"),
-        ({"inflow": {"u0": 1, "u1": -1}}, "fluxes alone do not determine the solution"),
+        ({"value": "u0", "conditions": [iga_nn.Flux("nx < -0.99", 1)]}, "flux 'nx < -0.99': no part of the boundary"),
+        ({"conditions": [iga_nn.Flux("u0", 1), iga_nn.Flux("u1", -1)]}, "fluxes alone do not determine the solution"),
         ({"value": {"u0": 0, "x > 3.99": 1}}, "value 'x > 3.99': newton holds all of u on whole faces"),
     ],
 )

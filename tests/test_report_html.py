@@ -154,7 +154,7 @@ def test_scene_holds_places_and_values(result):
 
 def test_scene_of_a_body_has_stress_and_displacements():
     volume = benchmark_volume(1)
-    body = solve.Elasticity(force=("0", "0", "-1"))
+    body = solve.Elasticity(body_force=("0", "0", "-1"))
     solution = solve.solve_problem(volume, body)
     drawing = scene.scene_of(volume, solution, body)
     titles = ["von Mises stress", "|u|", "u_x", "u_y", "u_z", "tanh(√ARAP / 2), at volume 1"]

@@ -173,8 +173,11 @@ def test_one_patch_of_several_is_the_volume():
         (lambda: iga_nn.Poisson(source="1", value={"p7_u1": "0"}), "p7_u1 is no outer face"),
         (lambda: iga_nn.Poisson(source="1", boundary="0", kappa={0: 1.0}), "kappa has no entry for patch 1"),
         (lambda: iga_nn.Poisson(source="1", boundary="0", kappa=dict.fromkeys(range(3), 1.0)), "there is no patch 2"),
-        (lambda: iga_nn.Elasticity(force=(0, 0, 1), young=dict.fromkeys((0, 1, 7), 1.0)), "young: there is no patch 7"),
-        (lambda: iga_nn.Elasticity(force=(0, 0, 1), young={1: 1.0}), "young has no entry for patch 0"),
+        (
+            lambda: iga_nn.Elasticity(body_force=(0, 0, 1), young=dict.fromkeys((0, 1, 7), 1.0)),
+            "young: there is no patch 7",
+        ),
+        (lambda: iga_nn.Elasticity(body_force=(0, 0, 1), young={1: 1.0}), "young has no entry for patch 0"),
     ],
 )
 def test_data_that_do_not_fit_the_patches_are_refused(law, says):

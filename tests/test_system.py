@@ -77,8 +77,8 @@ def test_fields_as_data_are_the_functions_they_hold():
     found, wanted = (solve_problem(volume, p, refine=1, tolerance=1e-12).coefficients for p in (fields, formulas))
     assert np.allclose(found, wanted, atol=1e-10)
     place = SplineField(volume.degrees, volume.knots, volume.control_points)
-    body = iga_nn.Elasticity(force=place, displacement=(x, "y", lambda x, y, z: z))
-    written = iga_nn.Elasticity(force=("x", "y", "z"), displacement=("x", "y", "z"))
+    body = iga_nn.Elasticity(body_force=place, displacement=(x, "y", lambda x, y, z: z))
+    written = iga_nn.Elasticity(body_force=("x", "y", "z"), displacement=("x", "y", "z"))
     found, wanted = (solve_problem(volume, p, estimate=True) for p in (body, written))
     assert np.allclose(found.coefficients, wanted.coefficients, atol=1e-8)
     assert found.report.error_estimate == pytest.approx(wanted.report.error_estimate, rel=1e-6)
@@ -103,7 +103,7 @@ def test_a_law_may_read_a_field():
 
 def test_a_vector_of_a_coarser_field_is_the_same_spline():
     """Zero on the boundary on both levels: knot insertion changes nothing."""
-    body = iga_nn.Elasticity(force=("1", "x", "y"))
+    body = iga_nn.Elasticity(body_force=("1", "x", "y"))
     coarse, fine = (iga_nn.discretize(benchmark_volume(2), body, refine=level) for level in (0, 1))
     field, where = coarse.solve().field, ([0.3, 0.9], [0.5], [0.6])
     assert np.allclose(fine.field(fine.vector(field)).grid(*where), field.grid(*where), rtol=1e-12)

@@ -41,7 +41,7 @@ def test_a_region_ends_at_the_equals_sign_that_is_no_comparison(entry, region, d
         (ElasticityOptions(fix=("=1;0;0",)), "write a region before the ="),
         (ElasticityOptions(fix=("x < 1=1;0",)), "write three formulas"),
         (ElasticityOptions(fix=("x",), load=("y < 1=0;0;1",)), "region 'x': expression"),
-        (ElasticityOptions(fix=("x < 1",), load=("y < 1",)), "load 'y < 1': has no data"),
+        (ElasticityOptions(fix=("x < 1",), load=("y < 1",)), "load 'y < 1' has no data"),
         (ElasticityOptions(fix=("x < 1",), traction=("u0=0",)), "not both"),
         (PoissonOptions(exchange=("x < 1=2",)), "write REGION=ALPHA:OUTSIDE"),
         (PoissonOptions(value=("x < 1=q",)), "value 'x < 1': expression"),

@@ -44,7 +44,9 @@ def test_regions_and_reactions_are_told_in_terminal_report_and_page(in_folder, c
 
 
 def test_data_of_conditions_are_told_as_text():
-    given = iga_nn.Poisson(value={"u0": "x*y"}, inflow={"u1": 2.5}, exchange={"v0": ("3", 20.0)})
+    given = iga_nn.Poisson(
+        conditions=[iga_nn.Value("u0", "x*y"), iga_nn.Flux("u1", 2.5), iga_nn.Exchange("v0", "3", 20.0)]
+    )
     report = iga_nn.solve(benchmark_volume(1), given).report
     assert [(one["kind"], one["data"]) for one in regions_of(given, report)] == [
         ("value", "x*y"),

@@ -15,7 +15,7 @@ from parameterize.spline.body import Body, BodyLike, as_body
 from parameterize.spline.interface import axis_side, face_label
 from parameterize.surface.geometry import normals_and_areas
 from parameterize.surface.surface import Surface
-from solve.forms.condition import Condition
+from solve.forms.conditions import Condition
 from solve.forms.frame import face_geometry
 from solve.forms.region import Region
 

@@ -112,11 +112,12 @@ class ModesOptions(Checked):
 
         check_space([self.refine], self.degree)
         free = {} if self.fix or self.roller else dict.fromkeys(FACE_NAMES, ["0"] * 3)
-        held = {"fix": self.fix or None, "roller": self.roller or None}
         with input_errors():
             check_modes(self.density, self.number)
             young, ratio = modulus("--young", self.young), modulus("--poisson-ratio", self.poisson_ratio)
-            return Elasticity(traction=free, young=young, poisson_ratio=ratio, **held)
+            return Elasticity(
+                traction=free, young=young, poisson_ratio=ratio, fix=self.fix or None, roller=self.roller or None
+            )
 
 
 def _range(text: str) -> list[int]:

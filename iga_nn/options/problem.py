@@ -132,6 +132,7 @@ class PoissonOptions(ProblemOptions):
     def problem(self) -> Poisson:
         """Return the problem of these options. Raises InputError."""
         from solve import Poisson
+        from solve.forms.conditions import Flux
 
         check_space(self.refine, self.degree)
         robin = {}
@@ -150,7 +151,7 @@ class PoissonOptions(ProblemOptions):
                 neumann=texts.faces("neumann", self.neumann),
                 robin=robin,
                 value=texts.on_regions("value", self.value, str),
-                inflow=texts.on_regions("flux", self.flux, str),
+                conditions=[Flux(*one) for one in (texts.on_regions("flux", self.flux, str) or {}).items()],
                 exchange=texts.on_regions("exchange", self.exchange, texts.pair),
             )
 
@@ -194,7 +195,7 @@ class ElasticityOptions(ProblemOptions):
 
     Examples:
         >>> import iga_nn
-        >>> iga_nn.ElasticityOptions(body_force="0;0;-1", young=210.0).problem().force
+        >>> iga_nn.ElasticityOptions(body_force="0;0;-1", young=210.0).problem().body_force
         ['0', '0', '-1']
     """
 
@@ -237,7 +238,7 @@ class ElasticityOptions(ProblemOptions):
         with input_errors():
             body = Elasticity(
                 exact=texts.vector("--exact", self.exact),
-                force=texts.vector("--body-force", self.body_force),
+                body_force=texts.vector("--body-force", self.body_force),
                 displacement=texts.vector("--displacement", self.displacement),
                 traction={face: texts.vector(f"--traction {face}", text) for face, text in traction.items()},
                 young=modulus("--young", self.young),

@@ -243,7 +243,7 @@ def _check_data(problem: BoundaryValueProblem, surface: Surface) -> None:
     """Check the problem's data on the surface, because no points inside are known yet. Raises ExpressionError."""
     problem = problem.placed(frame_of(surface))
     points = surface.vertices.T
-    for evaluate in (problem.boundary_at, problem.source_at, problem.form.tensor, problem.form.mass):
+    for evaluate in (problem.source_at, problem.form.tensor, problem.form.mass):
         evaluate(points)
     if problem.exact is not None:
         problem.exact_at(points)
@@ -255,7 +255,9 @@ def _check_data(problem: BoundaryValueProblem, surface: Surface) -> None:
             check_regions(problem.on_surface(surface.part), surface)
         return
     for face in FACE_NAMES:
-        if face not in problem.dirichlet:
+        if face in problem.dirichlet:
+            problem.boundary_at(points, face)
+        else:
             _check_somewhere(partial(problem.on_face, face), surface.vertices, normals)
 
 

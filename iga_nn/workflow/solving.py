@@ -5,7 +5,6 @@ import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, replace
-from itertools import zip_longest
 from typing import Any
 
 import numpy as np
@@ -13,7 +12,6 @@ import numpy as np
 from parameterize.spline.body import BodyLike
 from solve import ConvergenceError, ConvergenceRow, Modes, SolveOptions, SolveReport, rates, solve_with
 from solve.forms.boundary_value_problem import BoundaryValueProblem
-from solve.forms.condition import WITH_FACTOR, Condition
 from solve.forms.frame import UnitFrame
 
 from ..errors import InputError, input_errors, one_line
@@ -207,30 +205,10 @@ def regions_of(problem: BoundaryValueProblem, report: SolveReport) -> list[dict[
     """
     areas = report.balance.areas if report.balance else {}
     return [
-        {"kind": condition.kind, "region": str(condition.region), "data": _as_text(condition)}
+        {"kind": condition.kind, "region": str(condition.region), "data": condition.text}
         | ({"area": areas[condition.role]} if condition.role in areas else {})
         for condition in problem.conditions
     ]
-
-
-def _as_text(condition: Condition) -> str:
-    """Return data as text; for an exchange or a spring the factor, and the value outside where it is not zero."""
-    if condition.kind in WITH_FACTOR:
-        factor, outside = map(_joined, condition.data)
-        return (
-            factor if condition.kind == "spring" and condition.data[1] == [0.0] * 3 else f"{factor}, outside {outside}"
-        )
-    return _joined(condition.data, condition.free)
-
-
-def _joined(data: Any, free: Sequence[bool] = ()) -> str:
-    """Return a formula or a number, or the entries of a vector with semicolons between them."""
-    if isinstance(data, list | tuple):
-        held = zip_longest(data, free, fillvalue=False)
-        return ";".join("free" if is_free else _joined(entry) for entry, is_free in held)
-    if data is None:
-        return "that of the exact solution"
-    return f"{data:.12g}" if isinstance(data, float) else str(data)
 
 
 def described(problem: BoundaryValueProblem, body: BodyLike) -> dict[str, Any]:

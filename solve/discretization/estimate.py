@@ -155,13 +155,13 @@ def _hold(volume: BSplineVolume, problem: BoundaryValueProblem, axis: int, side:
     face = f"{AXES[axis]}{side}"
     if face in problem.dirichlet:
         return np.inf
-    if (role := f"robin {face}: alpha") not in problem.data:
-        return 0.0
     x, area = face_geometry(volume, (ON_FACE,) * 3, axis, side)
+    if (factor := problem.factor_on(face, x)) is None:
+        return 0.0
     u, v, w = (np.array([float(side)]) if a == axis else ON_FACE for a in range(3))
     tangent = np.moveaxis(np.squeeze(volume.grid(u, v, w, FIRST[axis]), axis), -1, 0)
     det = np.abs(_dot(area, tangent))
-    alpha = problem.data[role](x)[0] * det * np.linalg.norm(area, axis=0)
+    alpha = factor * det * np.linalg.norm(area, axis=0)
     through = float(_quadratic(problem.form.tensor(x), area).sum())
     return float(alpha.sum()) / through if through > 0.0 else 0.0
 

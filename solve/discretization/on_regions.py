@@ -17,7 +17,7 @@ from parameterize.spline.volume import FACE_NAMES, BSplineVolume
 
 from ..field import Points
 from ..forms.boundary_value_problem import BoundaryValueProblem
-from ..forms.condition import Condition
+from ..forms.conditions import Condition, Value
 from .boundary import has_face
 from .space import TrialSpace
 from .surface_rule import SurfaceRule, surface_rule
@@ -175,11 +175,11 @@ class _Builder:
         projector, given = np.zeros((c, c, m)), np.zeros((c, m))
         for i, condition in enumerate(self.problem.conditions):
             here = np.flatnonzero(self._holding(i))
-            if not condition.is_essential or not len(here):
+            if not isinstance(condition, Value) or not len(here):
                 continue
             points = Points.at(np.ascontiguousarray(x[:, here]), x.places[here])  # type: ignore[index]
             for direction in condition.directions(c, normal[:, here]):
-                value = self.problem.values_on(condition, direction, points)
+                value = condition.values_along(direction, self.problem, points)
                 new = direction - np.einsum("cdm,dm->cm", projector[:, :, here], direction)
                 size = np.linalg.norm(new, axis=0)
                 missing = value - (direction * given[:, here]).sum(axis=0)
@@ -219,18 +219,18 @@ class _Builder:
             if condition.is_essential or not len(here):
                 continue
             points = Points.at(np.ascontiguousarray(x[:, here]), x.places[here])  # type: ignore[index]
-            found = self.problem.flux_on(condition, points, normal[:, here])
+            found = condition.flux_at(self.problem, points, normal[:, here])
             lost = np.abs(np.einsum("cdm,dm->cm", projector[:, :, here], found)).max(axis=0)
             wrong = here[lost > CONTRADICTION * np.abs(found).max()]
-            if condition.role in self.problem.data and self._is_area(wrong, here):
+            if condition.datum is not None and self._is_area(wrong, here):
                 self._refuse_load(condition, wrong[0])
             loads[:, here] += found
-            if f"{condition.role}: factor" in self.problem.data:
-                factor[here] += self.problem.factor_on(condition, points)
+            if condition.factor is not None:
+                factor[here] += condition.factor_at(points)
         rest = np.flatnonzero((self.rule.codes & 1 == 1) & ~named | self._partly_held(projector, named))
         if self.problem.exact_formulas and len(rest):
             points = Points.at(np.ascontiguousarray(x[:, rest]), x.places[rest])  # type: ignore[index]
-            loads[:, rest] += self.problem.flux_on(None, points, normal[:, rest])
+            loads[:, rest] += self.problem.exact_flux("flux", points, normal[:, rest])
         return loads, factor
 
     def _partly_held(self, projector: Array, named: Array) -> Array:

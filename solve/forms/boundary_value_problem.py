@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import re
-from collections.abc import Collection, Mapping
+import warnings
+from collections.abc import Collection, Iterator, Mapping
 from copy import copy
-from dataclasses import replace
-from typing import ClassVar, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
@@ -15,43 +14,57 @@ from parameterize.spline.body import BodyLike
 from parameterize.spline.volume import FACE_NAMES
 
 from ..field import MultiPatchField, SplineField
-from .condition import WITH_FACTOR, Condition
-from .data import ByPatch, Data, Datum, PerPatch, demand, finite, parse
+from .conditions import Condition, Flux, OnFaces, Robin, Value, on_faces, on_regions
+from .data import ByPatch, Data, Datum, PerPatch, finite, parse_each
 from .form import Form, check_shapes, strong_form, strong_terms
 from .frame import UnitFrame
 from .jets import Jet, Numbers, coordinates, known
 from .parser import Expression
 from .region import Part
 
-PATCH_FACE = re.compile(r"p(\d+)_([uvw][01])")  # the face of one patch of several, as in "p2_u0"
-
-Natural = Mapping[str, Data | None]
-Robin = Mapping[str, tuple[Data, Data | None]]
+FORMER = {"inflow": "conditions=[iga_nn.Flux(region, data), ...]", "force": "body_force=..."}  # keyword -> its new form
 
 
 class BoundaryValueProblem:
     """Evaluate a law and its data at points (3, ...), components first: the interface of a problem to the solver.
 
-    Data have roles: exact, source, boundary; "neumann u0", "robin u0" and "robin u0: alpha" of a face; and those of the
-    law's own coefficients. Every method raises ExpressionError where data are not finite.
+    Data in the volume have roles: exact, source, and those of the law's own coefficients. Data on the boundary are
+    conditions: those on regions, or those of whole faces, where the keywords of faces give them. Every method raises
+    ExpressionError where data are not finite.
     """
 
     form: Form
     exact: Data | None
     of_coordinates: ClassVar[bool] = False  # whether functions as data take three arrays x, y, z
     labels: ClassVar[Mapping[str, str]] = {}  # role -> its name in messages, where it has another
-    natural: tuple[str, ...]  # faces on which the flux through them is given
-    dirichlet: tuple[str, ...]  # faces on which u itself is given
+    keywords: ClassVar[Mapping[str, type[Condition]]] = {}  # of conditions on regions
     conditions: tuple[Condition, ...]  # on regions of the boundary; where there are any, all else of it is free
+    faces: tuple[Condition, ...]  # on whole faces, which have data without regions
+    dirichlet: tuple[str, ...]  # faces on which u itself is given
     prefix: str = ""  # of the names of faces, "p2_" for patch 2 of several
     data: Mapping[str, Datum]  # by role
+
+    def _assign(self, **values: Any) -> Self:
+        for name, value in values.items():
+            object.__setattr__(self, name, value)
+        return self
+
+    def _read_keywords(self) -> None:
+        """Turn the keywords of regions into conditions, and former keywords into those of today."""
+        for name in FORMER.keys() & vars(self).keys():
+            if getattr(self, name) is not None:
+                warnings.warn(f"{name}: write {FORMER[name]}", DeprecationWarning, stacklevel=4)
+        made = [one for name, kind in self.keywords.items() for one in on_regions(kind, getattr(self, name))]
+        self._assign(conditions=(*self.conditions, *made), **dict.fromkeys(self.keywords))
+        if wrong := [one for one in self.conditions if not isinstance(one, Condition)]:
+            raise ValueError(f"conditions must be objects such as iga_nn.Value('u0', 1), got {wrong[0]!r:.80}")
 
     def _set(
         self,
         given: Mapping[str, PerPatch | None],
-        neumann: Natural,
-        robin: Robin,
-        conditions: tuple[Condition, ...] = (),
+        boundary: Any,
+        neumann: OnFaces | None,
+        robin: OnFaces | None = None,
         **counts: int,
     ) -> None:
         """Parse the data. Raises ValueError where the data do not fit together or cannot be derived.
@@ -59,34 +72,47 @@ class BoundaryValueProblem:
         counts: by role, the number of entries of a datum, where it is not the number of the law's components.
         """
         self._check_components()
-        self._check_faces(neumann, robin)
-        on_faces = {f"neumann {face}": entry for face, entry in neumann.items()}
-        for face, (alpha, entry) in robin.items():
-            on_faces |= {f"robin {face}: alpha": alpha, f"robin {face}": entry}
-        on_regions = {role: pair for condition in conditions for role, pair in condition.given().items()}
-        data = self._parsed({**given, **on_faces}, counts)
-        for role, (entry, size) in on_regions.items():
-            if entry is not None:
-                data[role] = parse(role, entry, size or self.form.components, of_coordinates=self.of_coordinates)
-        dirichlet = tuple(face for face in FACE_NAMES if face not in neumann and face not in robin)
-        if conditions:
-            if on_faces or given.get("boundary") is not None:
+        natural: Mapping[str, tuple[type[Condition], OnFaces]]
+        natural = {self.label("neumann"): (Flux, neumann or {}), "robin": (Robin, robin or {})}
+        faces = on_faces(natural, self.label("boundary"), boundary)
+        if self.conditions:
+            if neumann or robin or boundary is not None:
                 raise ValueError(
                     f"give data on regions, or on faces by {self.label('boundary')}, {self.label('neumann')} and "
                     'robin, not both: a face of the cube is a region, too, as in "u0"'
                 )
-            strong = {face for condition in conditions if condition.is_strong for face in condition.region.faces}
-            dirichlet = tuple(face for face in FACE_NAMES if face in strong)
-        for name, value in (
-            ("data", data),
-            ("natural", tuple(neumann)),
-            ("dirichlet", dirichlet),
-            ("conditions", conditions),
-        ):
-            object.__setattr__(self, name, value)
-        for role in ("source", *on_faces, *on_regions):
-            if role not in data:
-                self._check_derived(role)
+            faces = []
+        components, of_coordinates = self.form.components, self.of_coordinates
+        data = {
+            role: parse_each(
+                self.label(role),
+                entry,
+                counts.get(role, components),
+                of_coordinates=of_coordinates,
+                counts_own=role in counts,
+            )
+            for role, entry in given.items()
+            if entry is not None
+        }
+        how = {"has_exact": "exact" in data, "of_coordinates": of_coordinates}
+        faces, conditions = ([one.stated(components, **how) for one in some] for some in (faces, self.conditions))
+        self._assign(data=data, faces=tuple(faces), conditions=tuple(conditions))
+        self._assign(dirichlet=tuple(filter(self.strong_on, FACE_NAMES)))
+        if "source" not in data:
+            self._check_derived("source")
+        for condition in self._all:
+            if condition.datum is None and not condition.is_essential:
+                self._check_derived(condition.role)
+
+    @property
+    def _all(self) -> tuple[Condition, ...]:
+        return (*self.faces, *self.conditions)
+
+    @property
+    def _datums(self) -> Iterator[tuple[str, Datum]]:
+        yield from self.data.items()
+        for condition in self._all:
+            yield from condition.parsed.items()
 
     def _check_components(self) -> None:
         """Raise ValueError for a law whose number of components is not a whole number."""
@@ -95,40 +121,6 @@ class BoundaryValueProblem:
             raise ValueError(
                 f"{type(self.form).__name__}.components must be a whole number, 1 or more, got {count!r:.80}"
             )
-
-    def _check_faces(self, neumann: Natural, robin: Robin) -> None:
-        """Raise ValueError for names of no face, for faces with two kinds of data, and for incomplete Robin data."""
-        for name, faces in ((self.label("neumann"), neumann), ("robin", robin)):
-            if not isinstance(faces, Mapping):
-                raise ValueError(f'{name} must be a dictionary of face names such as {{"u0": ...}}, got {faces!r:.80}')
-            for face in faces:
-                if face not in FACE_NAMES and not PATCH_FACE.fullmatch(str(face)):
-                    names = f"{', '.join(FACE_NAMES)}, and p2_u0 of patch 2 of several"
-                    raise ValueError(f"{name}: {face!r} is no face of the cube; the faces are {names}")
-        if wrong := [face for face, pair in robin.items() if not isinstance(pair, tuple | list) or len(pair) != 2]:
-            raise ValueError(f"robin {wrong[0]}: give two entries (alpha, g), got {robin[wrong[0]]!r:.80}")
-        if both := neumann.keys() & robin.keys():
-            raise ValueError(f"face {min(both)} has both Neumann and Robin data; give only one")
-
-    def _parsed(self, given: Mapping[str, PerPatch | None], counts: Mapping[str, int]) -> dict[str, Datum]:
-        """Return the data of the volume and of faces by role, without roles that have no data."""
-        data: dict[str, Datum] = {}
-        for role, entry in given.items():
-            if entry is not None:
-                count = counts.get(role, 1 if role.endswith(": alpha") else self.form.components)
-                face = role.split(":")[0].partition(" ")[2]
-                name, of_coordinates = self.label(role), self.of_coordinates
-                if not isinstance(entry, Mapping):
-                    data[role] = parse(name, entry, count, face, of_coordinates=of_coordinates)
-                    continue
-                if wrong := [key for key in entry if not isinstance(key, int) or key < 0]:
-                    raise ValueError(f"{name}: {wrong[0]!r} is no number of a patch, as in {{0: ..., 1: ...}}")
-                each = {}
-                for patch, own in entry.items():  # kappa may be a number here and a tensor there
-                    of_patch = len(own) if role in counts and isinstance(own, list) else count
-                    each[patch] = parse(f"{name} of p{patch}", own, of_patch, face, of_coordinates=of_coordinates)
-                data[role] = ByPatch.of(name, each, face)
-        return data
 
     def _check_derived(self, role: str) -> None:
         """Raise ValueError where data that are not given do not follow from `exact`."""
@@ -147,20 +139,19 @@ class BoundaryValueProblem:
 
     def label(self, role: str) -> str:
         """Return the name of the datum of a role for messages."""
-        first, _, rest = role.partition(" ")
-        return f"{self.labels.get(first, first)} {rest}".rstrip()
+        return self.labels.get(role, role)
 
     @property
     def formulas(self) -> list[tuple[str, Datum, Expression]]:
         """Return the data that are formulas: role, datum, and each formula of the datum."""
-        return [(role, datum, entry) for role, datum in self.data.items() for entry in datum.formulas]
+        return [(role, datum, entry) for role, datum in self._datums for entry in datum.formulas]
 
     def on(self, body: BodyLike) -> Self:
         """Return the same problem with X, Y, Z measured in a body, which has size 1 in X, Y, Z and its middle at 0.
 
         The middle is that of the bounding box. Raises ValueError for a field of another volume.
         """
-        for datum in self.data.values():
+        for _, datum in self._datums:
             if not all(entry.fits(body) for entry in datum.entries if isinstance(entry, SplineField | MultiPatchField)):
                 raise ValueError(
                     f"{datum.name}: the field was found on another volume; give one of the volume that is solved on"
@@ -169,63 +160,44 @@ class BoundaryValueProblem:
 
     @property
     def patch_faces(self) -> set[str]:
-        """Return the faces of single patches, as "p2_u0", that data or regions name."""
-        on_faces = {role.split(":")[0].partition(" ")[2] for role in self.data if role.startswith(("neumann", "robin"))}
-        in_regions = {name for condition in self.conditions for name in condition.region.patch_faces}
-        return {name for name in (*on_faces, *self.natural) if PATCH_FACE.fullmatch(name)} | in_regions
+        """Return the faces of single patches, as "p2_u0", that conditions name."""
+        return {name for condition in self._all for name in condition.region.patch_faces}
 
     @property
     def by_patch(self) -> dict[str, set[int]]:
         """Return the numbers of the patches for which data are given one by one, by the name of the datum."""
-        return {datum.name: set(datum.patches) for datum in self.data.values() if isinstance(datum, ByPatch)}
+        return {datum.name: set(datum.patches) for _, datum in self._datums if isinstance(datum, ByPatch)}
+
+    @property
+    def places(self) -> list[tuple[str, str]]:
+        """Return the kind and the region of each condition."""
+        return [(condition.kind, condition.region.text) for condition in self._all]
 
     def on_patch(self, patch: int, outer: Collection[str]) -> Self:
         """Return the problem of one patch of several, with data on the patch's outer faces alone.
 
         Data of "p2_u0" belong to a face of patch 2, data of "u0" to this face of every patch that has no own data.
         """
-        other = copy(self)
         prefix = f"p{patch}_"
-        data = {
-            role: datum.on_patch(patch)
-            for role, datum in self.data.items()
-            if not role.startswith(("neumann ", "robin "))
-        }
-        given = {kind: self._given_on(kind) for kind in ("neumann", "robin")}
-        natural: list[str] = []
-        robin: list[str] = []
-        for face in outer:
-            kind, name = next(
-                ((kind, name) for name in (prefix + face, face) for kind in given if name in given[kind]), ("", "")
-            )
-            if kind:
-                (natural if kind == "neumann" else robin).append(face)
-                for ending in ("", ": alpha"):
-                    if (role := f"{kind} {name}{ending}") in self.data:
-                        data[f"{kind} {face}{ending}"] = self.data[role].on_patch(patch)
-        dirichlet = tuple(face for face in outer if face not in natural and face not in robin)
-        if self.conditions:
-            strong = {face for condition in self.conditions if condition.is_strong for face in condition.region.faces}
-            dirichlet = tuple(face for face in outer if not strong.isdisjoint((face, prefix + face)))
-        for name, value in (
-            ("prefix", prefix),
-            ("data", data),
-            ("natural", tuple(natural)),
-            ("dirichlet", dirichlet),
-        ):
-            object.__setattr__(other, name, value)
-        return other
+        own = {face: self._of(prefix + face) or self._of(face) for face in outer}
+        won = [(one, [face for face in outer if own[face] is one]) for one in self.faces]
+        other = copy(self)._assign(
+            prefix=prefix,
+            data={role: datum.on_patch(patch) for role, datum in self.data.items()},
+            faces=tuple(one.on_patch(patch, names) for one, names in won if names),
+            conditions=tuple(one.on_patch(patch) for one in self.conditions),
+        )
+        return other._assign(dirichlet=tuple(filter(other.strong_on, outer)))
 
-    def _given_on(self, kind: str) -> set[str]:
-        """Return the names of faces with data of a kind, "neumann" or "robin"."""
-        if kind == "neumann":
-            return set(self.natural)
-        return {role.removeprefix("robin ").removesuffix(": alpha") for role in self.data if role.endswith(": alpha")}
+    def _of(self, face: str) -> Condition | None:
+        """Return the condition of a whole face; None where regions have the data."""
+        return next((one for one in self.faces if face in one.faces), None)
 
-    def strong_role(self, face: str) -> str | None:
-        """Return the role of the condition that holds all of u on a face, None where none does."""
+    def strong_on(self, face: str) -> Value | None:
+        """Return the condition that holds all of u on a face, None where none does."""
         names = {face, self.prefix + face}
-        return next((c.role for c in self.conditions if c.is_strong and not names.isdisjoint(c.region.faces)), None)
+        found = (one for one in self._all if isinstance(one, Value) and one.is_strong)
+        return next((one for one in found if not names.isdisjoint(one.faces)), None)
 
     def demand_held(self) -> None:
         """Raise ValueError where the data alone show that nothing fixes the solution."""
@@ -239,30 +211,25 @@ class BoundaryValueProblem:
 
     def on_surface(self, part: Part) -> Self:
         """Return the same problem, whose regions find faces and groups on a part's surface mesh."""
-        other = copy(self)
-        regions = (replace(condition, region=condition.region.placed(surface=part)) for condition in self.conditions)
-        object.__setattr__(other, "conditions", tuple(regions))
-        return other
+        return copy(self)._assign(conditions=tuple(one.placed(surface=part) for one in self.conditions))
 
     @property
     def needs_surface(self) -> bool:
         """Return whether a region names a face or a group of the part, and the surface of the part is unknown."""
-        return any(c.region.needs_surface and c.region.surface is None for c in self.conditions)
+        return any(one.region.needs_surface and one.region.surface is None for one in self.conditions)
 
     @property
     def fixes_nothing(self) -> bool:
         """Return whether there are neither given values of u nor an exchange with the outside."""
-        if self.conditions:
-            return not any(c.is_essential or c.kind in WITH_FACTOR for c in self.conditions)
-        return len(self.natural) == len(FACE_NAMES)
+        return not any(condition.is_support for condition in self._all)
 
     def placed(self, frame: UnitFrame) -> Self:
         """Return the same problem with X, Y, Z measured in a frame."""
-        other = copy(self)
-        object.__setattr__(other, "data", {role: datum.placed(frame) for role, datum in self.data.items()})
-        regions = (replace(condition, region=condition.region.placed(frame)) for condition in self.conditions)
-        object.__setattr__(other, "conditions", tuple(regions))
-        return other
+        return copy(self)._assign(
+            data={role: datum.placed(frame) for role, datum in self.data.items()},
+            faces=tuple(one.placed(frame) for one in self.faces),
+            conditions=tuple(one.placed(frame) for one in self.conditions),
+        )
 
     @property
     def not_differentiable(self) -> str:
@@ -299,67 +266,37 @@ class BoundaryValueProblem:
     def _exact_jets(self, x: Array, hessian: Numbers = (0.0,) * 6) -> list[Jet]:
         return [formula.jet(coordinates(np.asarray(x), hessian)) for formula in self.exact_formulas]
 
-    def boundary_at(self, x: Array, face: str = "") -> Array:
-        """Return the values of u (c, ...) given on the boundary, or the values of `exact`, or zero.
-
-        face: the face on which the points lie, where regions give a face its own values.
-        """
-        for role in (self.strong_role(face), "boundary", "exact"):
-            if role in self.data:
-                return self.data[role](x)  # type: ignore[index]
-        return np.zeros((self.form.components, *x.shape[1:]))
+    def boundary_at(self, x: Array, face: str) -> Array:
+        """Return the values of u (c, ...) given on a face, or the values of `exact`, or zero."""
+        if (condition := self.strong_on(face)) is not None:
+            return condition.values_at(self, x)
+        return self.exact_values(x) if "exact" in self.data else np.zeros((self.form.components, *x.shape[1:]))
 
     def on_face(self, face: str, x: Array, normal: Array) -> tuple[Array | None, Array]:
         """Return alpha (...) and g (c, ...) of flux . n + alpha u = g on a face; alpha is None for Neumann's data.
 
         normal: (3, ...), outward unit normals.
         """
-        role, alpha = f"neumann {face}", None
-        if face not in self.natural:
-            role = f"robin {face}"
-            alpha = self.data[f"{role}: alpha"](x)[0]
-            demand(alpha >= 0.0, f"{role}: alpha", "zero or positive", x)
-        if role in self.data:
-            return alpha, self.data[role](x)
-        flux = self._flux_of_exact(role, x, normal)
-        return alpha, flux if alpha is None else flux + alpha * self.data["exact"](x)
+        condition = self._of(face)
+        assert condition is not None
+        return self.factor_on(face, x), condition.flux_at(self, x, normal)
 
-    def _flux_of_exact(self, role: str, x: Array, normal: Array) -> Array:
-        """Return flux . n (c, ...) of the formulas `exact`; role: the role that messages name."""
+    def factor_on(self, face: str, x: Array) -> Array | None:
+        """Return alpha (...) of a face with data of its own; None where its flux does not depend on u."""
+        condition = self._of(face)
+        return None if condition is None or condition.factor is None else condition.factor_at(x)
+
+    def exact_values(self, x: Array) -> Array:
+        """Return u (c, ...) of the exact solution at points (3, ...)."""
+        return self.data["exact"](x)
+
+    def exact_flux(self, name: str, x: Array, normal: Array) -> Array:
+        """Return flux . n (c, ...) of the formulas `exact`; zero without them. name: the datum, for messages."""
+        if not self.exact_formulas:
+            return np.zeros((self.form.components, *x.shape[1:]))
         u, grad = known(self._exact_jets(x, ()), x.shape[1:])
         flux = (np.asarray(self.form.flux(u, grad, x), dtype=np.float64) * normal).sum(axis=1)
-        return finite(f"{self.label(role)} (from exact)", flux, x, self._first_formula)
-
-    def values_on(self, condition: Condition, direction: Array, x: Array) -> Array:
-        """Return the values (m,) of an essential condition along a direction (c, m) at points (3, m)."""
-        role = condition.role if condition.role in self.data else "exact"
-        found = self.data[role](x)
-        return found[0] if len(found) != len(direction) else np.asarray((found * direction).sum(axis=0))
-
-    def flux_on(self, condition: Condition | None, x: Array, normal: Array) -> Array:
-        """Return the flux (c, m) into the body that a condition gives at points (3, m) with normals (3, m).
-
-        A condition None is the rest of the boundary, with the flux of `exact` or without flux. For a condition with a
-        factor, the flux is that for u = 0.
-        """
-        if condition is None or (condition.data is None and condition.role not in self.data):
-            if not self.exact_formulas:
-                return np.zeros((self.form.components, *x.shape[1:]))
-            return self._flux_of_exact("flux" if condition is None else condition.role, x, normal)
-        if condition.kind in WITH_FACTOR:
-            factor = self.factor_on(condition, x)
-            if condition.role in self.data:
-                return np.asarray(factor * self.data[condition.role](x))
-            return self._flux_of_exact(condition.role, x, normal) + factor * self.data["exact"](x)
-        found = self.data[condition.role](x)
-        return -found[0] * normal if condition.kind == "pressure" else found
-
-    def factor_on(self, condition: Condition, x: Array) -> Array:
-        """Return the factor (m,) of an exchange or a spring at points (3, m)."""
-        role = f"{condition.role}: factor"
-        factor = self.data[role](x)[0]
-        demand(factor >= 0.0, role, "zero or positive", x)
-        return factor
+        return finite(f"{name} (from exact)", flux, x, self._first_formula)
 
     def exact_at(self, x: Array) -> tuple[Array, Array | None]:
         """Return exact u (c, ...) and its gradient (c, 3, ...), None where the derivatives are unknown."""

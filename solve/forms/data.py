@@ -151,6 +151,30 @@ def parse(name: str, data: Data, components: int = 1, face: str = "", *, of_coor
     return Datum(name, tuple(parsed), components, face)
 
 
+def parse_each(
+    name: str,
+    data: Any,
+    components: int = 1,
+    face: str = "",
+    *,
+    of_coordinates: bool = False,
+    counts_own: bool = False,
+) -> Datum:
+    """Return a user's datum as `parse` does, or data given as a dictionary of patches as one datum.
+
+    counts_own: whether the number of entries may differ from patch to patch: kappa is a number here, a tensor there.
+    """
+    if not isinstance(data, Mapping):
+        return parse(name, data, components, face, of_coordinates=of_coordinates)
+    if wrong := [key for key in data if not isinstance(key, int) or key < 0]:
+        raise ValueError(f"{name}: {wrong[0]!r} is no number of a patch, as in {{0: ..., 1: ...}}")
+    each = {}
+    for patch, own in data.items():
+        count = len(own) if counts_own and isinstance(own, list) else components
+        each[patch] = parse(f"{name} of p{patch}", own, count, face, of_coordinates=of_coordinates)
+    return ByPatch.of(name, each, face)
+
+
 def _shape(field: SplineField | MultiPatchField) -> tuple[int, ...]:
     """Return the shape of a field's values: (), or (c,) with c components."""
     return (field if isinstance(field, SplineField) else field.patches[0]).coefficients.shape[3:]

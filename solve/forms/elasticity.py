@@ -2,23 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass, field
 from numbers import Real
-from typing import Any, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
 from parameterize.arrays import Array
 
-from .boundary_value_problem import Natural
-from .condition import GivenRegions, conditions_of
+from .conditions import OF_BODIES, Condition, GivenRegions, OnFaces
 from .data import LARGEST, SMALLEST, Data
 from .form import Quantity
 from .problem import LawWithData
 
 NONE = ("0", "0", "0")  # of a vector
-ON_REGIONS = ("fix", "roller", "symmetry", "load", "pressure", "spring")
 
 
 NEARLY_RIGID = 0.45  # Poisson's ratio from which on the estimate of the error was 30 to 500 times too large
@@ -36,7 +34,7 @@ class Elasticity(LawWithData):
     exact : three entries, optional
         The displacement u, where it is known. As formulas it gives force and boundary data, and the report's errors;
         functions need them beside it, and leave the H1 seminorm out.
-    force : three entries, optional
+    body_force : three entries, optional
         f, per volume; overrides the force of `exact`, and is zero without it where `displacement` or `traction`
         are given.
     displacement : three entries, optional
@@ -48,19 +46,13 @@ class Elasticity(LawWithData):
         E > 0. On several patches also a dictionary, a number a patch.
     poisson_ratio : float
         -1 < nu < 1/2. `lame` converts from lambda and mu. On several patches also a dictionary, a number a patch.
-    fix : regions, or dict of region to three entries or None, optional
-        Displacement on regions of the boundary (`Region`, or its text), zero for regions alone; an entry that is None
-        leaves that component free. Where a region is given, the rest of the boundary is free, or has the traction of
-        `exact`; `displacement` and `traction` are left out then.
-    roller, symmetry : regions, or dict of region to entry, optional
-        The displacement along the normal alone, zero for regions alone: two names for one condition.
-    load : dict of region to three entries or None, optional
-        sigma n, force per area.
-    pressure : dict of region to entry, optional
-        Force per area against the outward normal.
-    spring : dict of region to entry, optional
-        k of sigma n = -k u: an elastic foundation, force per area and displacement; (k, three entries) for
-        sigma n = k (outside - u).
+    conditions : sequence of Fix, Roller, Symmetry, Load, Pressure or Spring, optional
+        Supports and loads on regions of the boundary. Where a region is given, the rest of the boundary is free, or has
+        the traction of `exact`; `displacement` and `traction` are left out then.
+    fix, roller, symmetry, load, pressure, spring : dict of region to data, optional
+        Short forms of these: `load={"u1": (0, 0, 1)}`; of supports also regions alone, `fix="u0"`.
+    force : three entries, optional
+        The former name of `body_force`.
 
     Raises
     ------
@@ -79,22 +71,25 @@ class Elasticity(LawWithData):
     """
 
     exact: Data | None = None
-    force: Data | None = None
+    body_force: Data | None = None
     displacement: Data | None = None
-    traction: Natural = field(default_factory=dict)
+    traction: OnFaces = field(default_factory=dict)
     young: float | Mapping[int, float] = 1.0
     poisson_ratio: float | Mapping[int, float] = 0.3
     _: KW_ONLY
+    conditions: Sequence[Condition] = ()  # type: ignore[assignment]  # a tuple once the problem is made
     fix: GivenRegions | None = None
     roller: GivenRegions | None = None
     symmetry: GivenRegions | None = None
     load: GivenRegions | None = None
     pressure: GivenRegions | None = None
     spring: GivenRegions | None = None
+    force: Data | None = None
 
     components = 3
     constant = True
-    labels = {"source": "force", "boundary": "displacement", "neumann": "traction"}  # noqa: RUF012
+    labels: ClassVar = {"source": "body_force", "boundary": "displacement", "neumann": "traction"}
+    keywords: ClassVar = OF_BODIES
 
     def __post_init__(self) -> None:
         for young in _values(self.young):
@@ -103,11 +98,12 @@ class Elasticity(LawWithData):
         for ratio in _values(self.poisson_ratio):
             if not (isinstance(ratio, Real) and -1.0 < ratio < 0.5):
                 raise ValueError(f"poisson_ratio must lie between -1 and 1/2, got {ratio!r:.80}")
-        on_regions = conditions_of(3, self.exact, **{kind: getattr(self, kind) for kind in ON_REGIONS})
-        is_loaded = self.displacement is not None or bool(self.traction) or bool(on_regions)
-        force = NONE if self.force is None and self.exact is None and is_loaded else self.force
-        given = {"exact": self.exact, "source": force, "boundary": self.displacement}
-        self._set(given, self.traction, {}, on_regions)
+        self._read_keywords()
+        if self.force is not None:
+            self._assign(body_force=self.force, force=None)
+        is_loaded = self.displacement is not None or bool(self.traction) or bool(self.conditions)
+        force = NONE if self.body_force is None and self.exact is None and is_loaded else self.body_force
+        self._set({"exact": self.exact, "source": force}, self.displacement, self.traction)
 
     def demand_held(self) -> None:
         """Raise ValueError where traction on all six faces leaves the body free to move."""

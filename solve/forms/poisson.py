@@ -4,15 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
 from parameterize.arrays import Array
 
 from ..field import MultiPatchField, SplineField
-from .boundary_value_problem import Natural, Robin
-from .condition import GivenRegions, conditions_of
+from .conditions import OF_SCALARS, Condition, GivenRegions, OnFaces
 from .data import NOT_SMOOTH, Data, Datum, PerPatch, demand, demand_definite, demand_size
 from .jets import PAIRS, SYMMETRIC, Jet
 from .problem import LawWithData
@@ -23,7 +22,7 @@ DEFAULT_EXACT = "exp(X+Z)*sin(Y)"  # the paper's solution (section 5.5), at volu
 
 @dataclass(frozen=True)
 class Poisson(LawWithData):
-    """-div(kappa grad u) + c u = f in the volume's own coordinates, with data on the images of the cube's six faces.
+    """-div(kappa grad u) + c u = f in the volume's own coordinates, with conditions on the boundary.
 
     Each entry is a formula in x, y, z and in X, Y, Z, the same scaled to volume 1 (`frame.UnitFrame`), a function of
     three arrays x, y, z of equal shape, or a field on the same volume (`solution.field`). Where no face and no reaction
@@ -48,14 +47,14 @@ class Poisson(LawWithData):
         kappa grad u . n on the faces "u0", "u1", "v0", "v1", "w0", "w1", n the outward unit normal; None: from `exact`.
     robin : dict of face name to (entry, entry or None)
         (alpha, g) of kappa grad u . n + alpha u = g; alpha not negative; None for g: from `exact`.
-    value : dict of region to entry or None, or regions, optional
-        Values of u on regions of the boundary (`Region`, or its text), zero for regions alone; None: from `exact`.
-        Where a region is given, the rest of the boundary has no flux, or that of `exact`; the source is zero unless it
-        is given or follows from `exact`; and `boundary`, `neumann` and `robin` are left out.
+    conditions : sequence of Value, Flux or Exchange, optional
+        Data on regions of the boundary. Where a region is given, the rest of the boundary has no flux, or that of
+        `exact`; the source is zero unless it is given or follows from `exact`; and `boundary`, `neumann` and `robin`
+        are left out.
+    value, exchange : dict of region to data, optional
+        Short forms of `Value` and `Exchange`: `value="u0"` is zero there, `exchange={"u1": (alpha, outside)}`.
     inflow : dict of region to entry or None, optional
-        kappa grad u . n on regions.
-    exchange : dict of region to (entry, entry or None), optional
-        (alpha, outside) of kappa grad u . n = alpha (outside - u) on regions, as of heat that passes to the air.
+        The former short form of `Flux`.
 
     Raises
     ------
@@ -79,23 +78,26 @@ class Poisson(LawWithData):
     boundary: Data | None = None
     kappa: PerPatch | None = None
     reaction: PerPatch | None = None
-    neumann: Natural = field(default_factory=dict)
-    robin: Robin = field(default_factory=dict)
+    neumann: OnFaces = field(default_factory=dict)
+    robin: OnFaces = field(default_factory=dict)
     value: GivenRegions | None = None
     inflow: GivenRegions | None = None
     exchange: GivenRegions | None = None
+    conditions: Sequence[Condition] = ()  # type: ignore[assignment]  # a tuple once the problem is made
+
+    keywords: ClassVar = OF_SCALARS
 
     def __post_init__(self) -> None:
-        on_regions = conditions_of(1, self.exact, value=self.value, flux=self.inflow, exchange=self.exchange)
-        given = {role: getattr(self, role) for role in ("exact", "source", "boundary", "reaction")}
-        if on_regions and self.exact is None and self.source is None:
+        self._read_keywords()
+        given = {role: getattr(self, role) for role in ("exact", "source", "reaction")}
+        if self.conditions and self.exact is None and self.source is None:
             given["source"] = "0"
         elif self.exact is None and self.source is None and self.boundary is None:
             object.__setattr__(self, "exact", DEFAULT_EXACT)
             given["exact"] = DEFAULT_EXACT
         kappa = _six(self.kappa)
         count = len(kappa) if isinstance(kappa, list) else 1
-        self._set({**given, "kappa": kappa}, self.neumann, self.robin, on_regions, kappa=count)
+        self._set({**given, "kappa": kappa}, self.boundary, self.neumann, self.robin, kappa=count)
 
     def flux(self, u: Any, grad: Any, x: Any) -> Any:
         """Return the flux kappa grad u, (1, 3, ...)."""

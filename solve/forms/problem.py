@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import KW_ONLY, dataclass, field
+from typing import ClassVar
 
-from .boundary_value_problem import BoundaryValueProblem, Natural, Robin
-from .condition import GivenRegions, conditions_of
+from .boundary_value_problem import BoundaryValueProblem
+from .conditions import OF_SCALARS, Condition, GivenRegions, OnFaces
 from .data import Data
 from .form import Form
 
@@ -23,7 +25,7 @@ class LawWithData(BoundaryValueProblem, Form):
 
 @dataclass(frozen=True)
 class Problem(BoundaryValueProblem):
-    """A law of one's own, -div flux + react = f, with data on the images of the cube's six faces.
+    """A law of one's own, -div flux + react = f, with conditions on the boundary.
 
     Each datum is, for c components, a sequence of c entries, or one entry where c = 1. An entry is a formula in x, y, z
     and X, Y, Z, a function of points x (3, ...) that returns (...), or a field (`solution.field`) on the same volume.
@@ -43,13 +45,13 @@ class Problem(BoundaryValueProblem):
         flux . n on "u0", ..., "w1", n the outward unit normal; None: from `exact`.
     robin : dict of face name to (entry, datum or None)
         (alpha, g) of flux . n + alpha u = g; alpha one entry, not negative; None for g: from `exact`.
-    value : dict of region to datum or None, or regions, optional
-        Values of u on regions of the boundary, zero for regions alone. Where a region is given, all of the boundary
-        that no region names has no flux, or that of `exact`; `boundary`, `neumann` and `robin` are left out then.
+    conditions : sequence of Value, Flux or Exchange, optional
+        Data on regions of the boundary. Where a region is given, all of the boundary that no region names has no flux,
+        or that of `exact`; `boundary`, `neumann` and `robin` are left out then.
+    value, exchange : dict of region to data, optional
+        Short forms of `Value` and `Exchange`: `value="u0"` is zero there, `exchange={"u1": (alpha, outside)}`.
     inflow : dict of region to datum or None, optional
-        flux . n on regions.
-    exchange : dict of region to (entry, datum or None), optional
-        (alpha, outside) of flux . n = alpha (outside - u) on regions; alpha not negative.
+        The former short form of `Flux`.
 
     Raises
     ------
@@ -79,17 +81,17 @@ class Problem(BoundaryValueProblem):
     exact: Data | None = None
     source: Data | None = None
     boundary: Data | None = None
-    neumann: Natural = field(default_factory=dict)
-    robin: Robin = field(default_factory=dict)
+    neumann: OnFaces = field(default_factory=dict)
+    robin: OnFaces = field(default_factory=dict)
+    conditions: Sequence[Condition] = ()  # type: ignore[assignment]  # a tuple once the problem is made
     value: GivenRegions | None = None
     inflow: GivenRegions | None = None
     exchange: GivenRegions | None = None
 
+    keywords: ClassVar = OF_SCALARS
+
     def __post_init__(self) -> None:
         if not isinstance(self.form, Form):
             raise TypeError(f"form must be an instance of a subclass of Form, got {self.form!r}")
-        given = {role: getattr(self, role) for role in ("exact", "source", "boundary")}
-        on_regions = {"value": self.value, "flux": self.inflow, "exchange": self.exchange}
-        self._set(
-            given, self.neumann or {}, self.robin or {}, conditions_of(self.form.components, self.exact, **on_regions)
-        )
+        self._read_keywords()
+        self._set({"exact": self.exact, "source": self.source}, self.boundary, self.neumann, self.robin)

@@ -225,7 +225,10 @@ class Region:
         return self.surface.flood(start, numbers[3] if len(numbers) == 4 else ANGLE)
 
 
-def regions_of(given: Region | str | Sequence[Region | str]) -> list[Region]:
+Regions = Region | str | Sequence[Region | str]
+
+
+def regions_of(given: Regions) -> list[Region]:
     """Return a region, a text, or several of these as regions. Raises ExpressionError for anything else."""
     if isinstance(given, Region):
         return [given]
