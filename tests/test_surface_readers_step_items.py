@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from step_files import Step, solid_and
 
-from parameterize.surface.readers.step_items import beside
+from parameterize.surface.readers.cad import passed_over
 
 
 @pytest.mark.parametrize(
@@ -24,7 +24,7 @@ from parameterize.surface.readers.step_items import beside
     ],
 )
 def test_items_are_counted_of_which_no_shape_is_made(make, found):
-    assert dict(beside(solid_and(make))) == found
+    assert dict(passed_over(solid_and(make))) == found
 
 
 def test_an_item_of_two_representations_is_one_and_points_of_the_solid_are_none():
@@ -33,7 +33,7 @@ def test_an_item_of_two_representations_is_one_and_points_of_the_solid_are_none(
     step.part(step.box(), point)
     step.part(point, kind="SHAPE_REPRESENTATION")
     step.representation([step.point((1, 1, 1))], "CONSTRUCTIVE_GEOMETRY_REPRESENTATION")
-    assert dict(beside(step.data())) == {"point": 2}
+    assert dict(passed_over(step.data())) == {"point": 2}
 
 
 def test_annotations_are_counted_once():
@@ -44,4 +44,4 @@ def test_annotations_are_counted_once():
     step.add("(ANNOTATION_OCCURRENCE() DRAUGHTING_ANNOTATION_OCCURRENCE() STYLED_ITEM('',(),#2))")
     step.add("TESSELLATED_ANNOTATION_OCCURRENCE('',(),#2)")
     step.add("ANNOTATION_PLANE('',(),#2,())")  # where annotations lie
-    assert dict(beside(step.data())) == {"annotation": 4}
+    assert dict(passed_over(step.data())) == {"annotation": 4}

@@ -5,10 +5,10 @@ from typing import Literal
 import numpy as np
 
 from ..arrays import Array, IntArray
-from .draft import Draft
 from .errors import MeshError
 from .filling import MOST_EDGES, fill
 from .geometry import directed_edges, normals_and_areas, vertex_normals
+from .mesh_repair import MeshRepair
 from .welding import is_closed
 
 Close = bool | Literal["all"]
@@ -68,21 +68,21 @@ def _nearest(rows: Array, start: Array, normal: Array) -> int:
     return int(np.argmin(np.mod(angles, 2.0 * np.pi)))
 
 
-def close_holes(draft: Draft, close: Close) -> tuple[Draft, list[str]]:
-    """Return the draft with all its holes filled, and a notice of their number and the area added.
+def close_holes(mesh: MeshRepair, close: Close) -> tuple[MeshRepair, list[str]]:
+    """Return the mesh with all its holes filled, and a notice of their number and the area added.
 
     The faces must be wound alike, every vertex used. Raises MeshError, with the option that fills them, where `close`
     is False, and unless it is "all" for a loop longer than a quarter of the box's diagonal and for more than 5 % of
     area.
     """
-    loops = boundary_loops(draft.points, draft.faces)
+    loops = boundary_loops(mesh.points, mesh.faces)
     if not loops:
-        return draft, []
-    longest, most = _longest(draft, loops), max(map(len, loops))
+        return mesh, []
+    longest, most = _longest(mesh, loops), max(map(len, loops))
     if not close:
         edges, border = sum(map(len, loops)), min(int(loop.min()) for loop in loops)
         raise MeshError(
-            f"open surface: {_loops(loops)} ({edges} edges), the first at {draft.where(border)}: close the "
+            f"open surface: {_loops(loops)} ({edges} edges), the first at {mesh.where(border)}: close the "
             f"{'hole' if len(loops) == 1 else 'holes'} with --close{' all' if longest > LONGEST else ''}, or in the "
             "program that made it"
         )
@@ -93,9 +93,9 @@ def close_holes(draft: Draft, close: Close) -> tuple[Draft, list[str]]:
         )
     if most > MOST_EDGES:
         raise MeshError(f"a boundary loop has {most} edges, more than {MOST_EDGES}: close it in another program")
-    points, parts = draft.points, [draft.faces]
+    points, parts = mesh.points, [mesh.faces]
     for loop in loops:
-        added, filled = fill(points, draft.faces, loop)
+        added, filled = fill(points, mesh.faces, loop)
         points = np.concatenate([points, added])
         parts.append(filled)
     before, after = (_area(points, np.concatenate(rows)) for rows in (parts[:1], parts[1:]))
@@ -106,24 +106,24 @@ def close_holes(draft: Draft, close: Close) -> tuple[Draft, list[str]]:
             f"{100 * LARGEST_SHARE:.0f} %: --close all fills them all the same"
         )
     patches = np.concatenate(parts[1:])
-    length, area = longest * _diagonal(draft) * draft.size, after * draft.size**2
+    length, area = longest * _diagonal(mesh) * mesh.size, after * mesh.size**2
     notice = (
         f"closed {_loops(loops)}, the longest {length:.3g} long ({100 * longest:.1f} % of the box's diagonal): "
         f"{len(patches)} faces added, their area {area:.3g}, {100 * share:.2g} % of the surface"
     )
-    return draft.with_patches(points[len(draft.points) :], patches), [notice]
+    return mesh.with_patches(points[len(mesh.points) :], patches), [notice]
 
 
-def _diagonal(draft: Draft) -> float:
-    return float(np.linalg.norm(np.ptp(draft.points, axis=0)))
+def _diagonal(mesh: MeshRepair) -> float:
+    return float(np.linalg.norm(np.ptp(mesh.points, axis=0)))
 
 
-def _longest(draft: Draft, loops: list[IntArray]) -> float:
+def _longest(mesh: MeshRepair, loops: list[IntArray]) -> float:
     """Return the length of the longest loop over the diagonal of the surface's box."""
     lengths = [
-        np.linalg.norm(np.roll(draft.points[loop], -1, axis=0) - draft.points[loop], axis=1).sum() for loop in loops
+        np.linalg.norm(np.roll(mesh.points[loop], -1, axis=0) - mesh.points[loop], axis=1).sum() for loop in loops
     ]
-    return float(max(lengths) / _diagonal(draft))
+    return float(max(lengths) / _diagonal(mesh))
 
 
 def _area(points: Array, faces: IntArray) -> float:

@@ -9,12 +9,11 @@ import numpy as np
 
 from ..arrays import Array, IntArray
 from .bodies import Choice, check_choice, choose_component
-from .draft import Draft
 from .errors import LARGEST, MeshError, check_face_count
-from .flaps import without_flaps
 from .holes import Close, check_close, close_holes
+from .mesh_repair import MeshRepair
 from .readers.file import RawMesh
-from .sheets import split, without_doubled
+from .sheets import split, without_doubled, without_flaps
 from .topology import check_edges, check_vertices
 from .welding import weld_and_drop, wind_alike, wind_outward
 
@@ -30,37 +29,37 @@ class Asked:
     max_faces: int
 
 
-def mend(raw: RawMesh, asked: Asked) -> tuple[Draft, list[str]]:
+def mend(raw: RawMesh, asked: Asked) -> tuple[MeshRepair, list[str]]:
     """Return the closed surface of one component, wound outward, and notices. Raises MeshError."""
     check_choice(asked.component)
     check_close(asked.close)
-    draft, mended = without_defects(raw, asked.max_faces)
-    draft, chosen = choose_component(draft, asked.component)
-    draft = draft.compact()
-    check_edges(draft.faces, draft.where)
-    alike, turned = wind_alike(draft.faces)
-    draft, closed = close_holes(replace(draft, faces=alike), asked.close)
-    check_edges(draft.faces, draft.where)
-    check_vertices(draft.faces, draft.where)
-    faces, outward = wind_outward(draft.points, draft.faces)
-    return replace(draft, faces=faces), [*mended, *chosen, *turned, *closed, *outward]
+    mesh, mended = without_defects(raw, asked.max_faces)
+    mesh, chosen = choose_component(mesh, asked.component)
+    mesh = mesh.compact()
+    check_edges(mesh.faces, mesh.where)
+    alike, turned = wind_alike(mesh.faces)
+    mesh, closed = close_holes(replace(mesh, faces=alike), asked.close)
+    check_edges(mesh.faces, mesh.where)
+    check_vertices(mesh.faces, mesh.where)
+    faces, outward = wind_outward(mesh.points, mesh.faces)
+    return replace(mesh, faces=faces), [*mended, *chosen, *turned, *closed, *outward]
 
 
-def without_defects(raw: RawMesh, max_faces: int) -> tuple[Draft, list[str]]:
+def without_defects(raw: RawMesh, max_faces: int) -> tuple[MeshRepair, list[str]]:
     """Return the mesh with all its components, without what is given twice or hangs loose, and all notices so far."""
     vertices, faces = raw.vertices, raw.faces
     check_face_count(len(faces), max_faces)
     if len(faces) < 4:
-        raise MeshError(f"{len(faces)} faces, a closed surface needs at least 4: export the whole surface")
+        raise MeshError(f"{len(faces)} triangles, a closed surface needs at least 4: export the whole surface")
     middle, size, remarks = _box(vertices, faces)
     unit = (vertices - middle) / size
     triangles, left, mended = weld_and_drop(unit, faces)
     if len(triangles) < 4:
-        raise MeshError(f"{len(triangles)} faces that are not degenerate, at least 4 are needed: export it again")
-    draft, doubled = without_doubled(Draft(vertices, unit, triangles, left, middle, size))
-    draft, loose = without_flaps(draft)
-    draft, touching = split(draft)
-    return draft, [*raw.notices, *remarks, *mended, *doubled, *loose, *touching]
+        raise MeshError(f"{len(triangles)} triangles that are not degenerate, at least 4 are needed: export it again")
+    mesh, doubled = without_doubled(MeshRepair(vertices, unit, triangles, left, middle, size))
+    mesh, loose = without_flaps(mesh)
+    mesh, touching = split(mesh)
+    return mesh, [*raw.notices, *remarks, *mended, *doubled, *loose, *touching]
 
 
 def _box(vertices: Array, faces: IntArray) -> tuple[Array, float, list[str]]:

@@ -338,26 +338,26 @@ def _array(values: ArrayLike, name: str) -> NDArray[Any]:
 def _gate(raw: RawMesh, name: str, source: str, asked: Asked) -> Surface:
     """Make a surface: mend it, check its topology, place it."""
     raw, component = one_solid(raw, asked.component)
-    draft, mended = mend(raw, replace(asked, component=component))
-    points, triangles = draft.points, draft.faces
-    doubts = topology.slivers(points, triangles, draft.where)
+    repaired, mended = mend(raw, replace(asked, component=component))
+    points, triangles = repaired.points, repaired.faces
+    doubts = topology.slivers(points, triangles, repaired.where)
     crossings = topology.crossing_faces(points, triangles)
     if len(crossings):
-        doubts.append(topology.describe_crossings(draft.vertices, triangles, crossings))
+        doubts.append(topology.describe_crossings(repaired.vertices, triangles, crossings))
     deepest, _ = Solid(points, triangles).deepest()
     unit_scale = signed_volume(points, triangles) ** (-1.0 / 3.0)
     placed = unit_scale * (points - deepest) + 0.5
     return Surface(
         name=name,
-        vertices=draft.vertices,
+        vertices=repaired.vertices,
         faces=triangles,
         source=source,
         sha256=raw.sha256,
         notices=(*mended, *doubts),
-        scale=unit_scale / draft.size,
-        center=deepest * draft.size + draft.middle,
+        scale=unit_scale / repaired.size,
+        center=deepest * repaired.size + repaired.middle,
         unit_vertices=placed.astype(np.float32).astype(np.float64),
         crossings=crossings,
-        groups=renumbered(raw.groups, draft.old),
+        groups=renumbered(raw.groups, repaired.old),
         unit=raw.unit,
     )

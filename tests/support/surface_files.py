@@ -177,7 +177,7 @@ REFUSED = {
     "flat.mesh": ("MeshVersionFormatted 2\nDimension 2\n", "not of dimension 3"),
     "short.mesh": (medit().replace(" 0\nTetra", "\nTetra"), "promises 12 Triangles, 48 numbers, 47 follow"),
     "range.ply": (ply(faces=[*TRIANGLES, [0, 1, 77]]), "1 vertex numbers out of range, the first is 77"),
-    "few.obj": (obj(faces=QUADS[:1]), "2 faces, a closed surface needs at least 4"),
+    "few.obj": (obj(faces=QUADS[:1]), "2 triangles, a closed surface needs at least 4"),
     "cut.stl": (binary_stl()[:-20], "must have 684 bytes, this one has 664"),
     "long.stl": (binary_stl() + b"abc", "must have 684 bytes, this one has 687"),
     "cut_text.stl": (text_stl()[:-100], "truncated or damaged"),

@@ -11,6 +11,7 @@ from .curves import WIDEST, Chain, Curve
 
 _FEWEST = 3  # curves around a closed chain
 _STRAIGHT = np.radians(10.0)  # a chain that turns less in all is not cut
+_FIRST_NORMAL = np.pi / 4.0  # its direction at the first node of a closed chain
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,14 +35,13 @@ class PlanarGraph:
 class Cutting:
     """How chains are cut: into how many times the fewest curves, and where closed ones begin.
 
-    finer: at least 1. turned: the direction of the normal, in radians, at the first node of a closed chain.
-    radial: whether the direction is counted from that in which the middle of the body is seen from the chain's middle.
+    finer: at least 1. radial: whether the direction of the normal at the first node of a closed chain is counted from
+    that in which the middle of the body is seen from the chain's middle.
     facing: whether straight sides of regions may be cut opposite the middles of curved ones, too: a segment of a disc
     has no other places for its corners.
     """
 
     finer: float = 1.0
-    turned: float = np.pi / 4.0
     radial: bool = False
     facing: bool = False
 
@@ -85,7 +85,7 @@ def _cut_closed(chain: Chain, nodes: list[Array], count: int, cutting: Cutting, 
     size = len(chain.points)
     normals = np.arctan2(-chain.tangents[:, 0], chain.tangents[:, 1])
     towards = middle - 0.5 * (chain.points.min(axis=0) + chain.points.max(axis=0))
-    start = cutting.turned
+    start = _FIRST_NORMAL
     if cutting.radial and np.linalg.norm(towards) > 1e-3 * np.ptp(chain.points, axis=0).max():
         start = start + float(np.arctan2(towards[1], towards[0]))
     period = 2.0 * np.pi / count

@@ -2,9 +2,12 @@
 
 It runs in a process of its own (`opencascade.py`): on a damaged file the library may end it, and it prints as it likes.
 It works in millimetres, or in the file's unit where that is smaller; lengths are brought back to the file's unit.
+Of a STEP file, annotations and geometry of which it makes no shape are found in its text: representations and their
+items by ISO 10303-43, shapes by ISO 10303-42, annotations by ISO 10303-46.
 """
 
 import json
+import re
 import subprocess
 import sys
 import tempfile
@@ -20,7 +23,6 @@ from ..errors import MeshError, check_face_count
 from ..groups import gathered
 from .cad_units import Unit, iges_unit, step_unit
 from .common import DAMAGED, Content
-from .step_items import beside
 
 INSTALL = "pip install 'iga-nn[cad]'"
 PROGRAM = Path(__file__).with_name("opencascade.py")
@@ -35,6 +37,19 @@ SAID = {
     "invalid": "OpenCASCADE finds a fault in the solid and cannot heal it: compare its volume",
 }
 PLURALS = {"other entity": "other entities", "surface without an outline": "surfaces without an outline"}
+# Of whose items shapes are made.
+SHAPES = re.compile(
+    rb"\b(?:\w*SHAPE_REPRESENTATION|CONSTRUCTIVE_GEOMETRY_REPRESENTATION)\s*\(\s*(?:'[^']{0,400}+')+\s*,\s*\(([^()]*+)\)"
+)
+NUMBER = re.compile(rb"#(\d{1,18})")
+TYPE = re.compile(rb"#(\d{1,18})\s*=\s*\(?\s*(\w{1,80}+)\s*\(")  # of a complex entity, the first of its types
+ANNOTATION = re.compile(rb"=\s*\(?\s*(?:DRAUGHTING_|TESSELLATED_)?ANNOTATION_(?:\w{1,40}_)?OCCURRENCE\s*\(")
+KINDS = (
+    (re.compile(r"\w*_CURVE(_WITH_KNOTS)?|LINE|POLYLINE|CIRCLE|ELLIPSE|PARABOLA|HYPERBOLA"), "curve"),
+    (re.compile(r"\w*_SURFACE(_WITH_KNOTS)?|PLANE"), "surface without an outline"),
+    (re.compile(r"CARTESIAN_POINT|POINT_ON_CURVE|POINT_ON_SURFACE"), "point"),
+    (re.compile(r"OPEN_SHELL|CLOSED_SHELL|ADVANCED_FACE|FACE_SURFACE"), "loose shell"),
+)
 
 
 def read_step(data: bytes, max_faces: int, deflection: float | None = None) -> Content:
@@ -55,7 +70,7 @@ def read_iges(data: bytes, max_faces: int, deflection: float | None = None) -> C
 def _read(data: bytes, kind: str, unit: Unit, max_faces: int, deflection: float | None) -> Content:
     """Return the bodies of a file in its unit. Raises MeshError where there are none."""
     arrays, facts = _run(data, kind, deflection, unit)
-    left_out = Counter(facts["left_out"]) + (beside(data) if kind == "step" else Counter())
+    left_out = Counter(facts["left_out"]) + (passed_over(data) if kind == "step" else Counter())
     _check(facts, len(arrays["faces"]), left_out)
     check_face_count(len(arrays["faces"]), max_faces)
     faces, owners = arrays["labels"].T
@@ -123,3 +138,14 @@ def _run(data: bytes, kind: str, deflection: float | None, unit: Unit) -> tuple[
         with np.load(target) as arrays:
             found = dict(arrays)
     return found, json.loads(str(found.pop("facts")))
+
+
+def passed_over(data: bytes) -> Counter[str]:
+    """Return the numbers of annotations, and of items by their kind, that OpenCASCADE passes over in a STEP file."""
+    named = {int(number[1]) for items in SHAPES.finditer(data) for number in NUMBER.finditer(items[1])}
+    types = {int(found[1]): found[2].decode() for found in TYPE.finditer(data) if int(found[1]) in named}
+    found: Counter[str] = Counter()
+    for name in types.values():
+        found.update(kind for pattern, kind in KINDS if pattern.fullmatch(name))
+    found["annotation"] = len(ANNOTATION.findall(data))
+    return +found

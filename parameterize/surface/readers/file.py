@@ -15,8 +15,7 @@ from ...arrays import Array, IntArray
 from ..errors import MeshError, check_face_count, check_finite, check_indices, without_unused_defects
 from ..groups import Groups, few, renumbered
 from ..triangulation import triangulate
-from .archive import Archive
-from .beside import Beside, in_archive, in_folder
+from .archive import Archive, Beside, in_archive, in_folder
 from .cad import read_iges, read_step
 from .common import DAMAGED, Content, Solids, most_bytes
 from .gltf import read_glb, read_gltf

@@ -14,7 +14,7 @@ import numpy as np
 from ...arrays import Array, IntArray, Mask
 from ..errors import MeshError, check_face_count, check_indices
 from ..groups import gathered
-from .beside import Beside
+from .archive import Beside
 from .common import DAMAGED, Content
 from .gltf_arrays import Arrays, item
 from .gltf_extensions import INSTANCES, compression_of, extension, unread

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from ...arrays import IntArray
 from ..errors import MeshError
-from .beside import Beside
+from .archive import Beside
 from .common import DAMAGED
 from .gltf_extensions import compression_of
 

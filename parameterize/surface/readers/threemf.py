@@ -15,8 +15,7 @@ from .archive import Archive
 from .common import DAMAGED, Content, most_bytes
 from .threemf_extensions import makes_another_body, name_of
 from .threemf_model import FULL, ModelPart, Object, Reference, read_model
-from .threemf_package import Package
-from .threemf_slicers import check_notes
+from .threemf_package import Package, check_notes
 
 UNITS = {"micron": "micron", "millimeter": "mm", "centimeter": "cm", "inch": "in", "foot": "ft", "meter": "m"}
 DEEPEST = 20  # components in components

@@ -15,6 +15,11 @@ RELATIONSHIPS = "/_rels/.rels"
 RELATIONSHIP = "{http://schemas.openxmlformats.org/package/2006/relationships}Relationship"
 MODEL = "http://schemas.microsoft.com/3dmanufacturing/2013/01/3dmodel"  # the type of the relationship to the model
 ENCRYPTED = b"%3McF"  # an encrypted part begins with it
+# Of slicers: files in which they note parts of a mesh that are no material: cuts, modifiers, places for supports.
+# PrusaSlicer writes these parts into the mesh, Bambu Studio and OrcaSlicer as components: the triangles alone are
+# another body.
+NOTES = ("/Metadata/Slic3r_PE_model.config", "/Metadata/model_settings.config")
+MATERIAL = ("ModelPart", "normal_part")
 
 
 class Xml:
@@ -108,3 +113,24 @@ def _part_name(reference: str) -> str:
     Names of parts are equal whatever their case. Relative references are those of the package's root.
     """
     return posixpath.normpath("/" + unquote(reference).lstrip("/")).lower()
+
+
+def check_notes(package: Package) -> None:
+    """Raise MeshError where a slicer's notes name a part of a mesh that is no material."""
+    for part in NOTES:
+        if package.has(part):
+            parse(package.read(part), _Notes())
+
+
+class _Notes(Xml):
+    def start(self, tag: str, given: dict[str, str]) -> None:
+        kind = MATERIAL[0]
+        if tag == "part":
+            kind = given.get("subtype", kind)
+        elif tag == "metadata" and given.get("key") == "volume_type":
+            kind = given.get("value", kind)
+        if kind not in MATERIAL:
+            raise MeshError(
+                f"a slicer marks a part of the 3MF as {kind[:40]!r}, which is no material: delete it there, "
+                "or apply it, and export the part again"
+            )

@@ -1,4 +1,4 @@
-"""Draft: a surface while it is mended. Each step takes a draft and returns the next one, with notices."""
+"""MeshRepair: a mesh while it is repaired. Each step takes one and returns the next one, with notices."""
 
 from dataclasses import dataclass, replace
 
@@ -8,7 +8,7 @@ from ..arrays import Array, IntArray, in_brackets
 
 
 @dataclass(frozen=True, eq=False)
-class Draft:
+class MeshRepair:
     """A surface before it is accepted.
 
     vertices: (n, 3), in the user's units. points: (n, 3), (vertices - middle) / size, in a box of side 1. faces: (m,
@@ -26,17 +26,17 @@ class Draft:
         """Return the place of a vertex in the user's units, in words."""
         return in_brackets(self.vertices[vertex])
 
-    def with_faces(self, kept: IntArray) -> "Draft":
-        """Return the draft of the kept faces (k,), with the same vertices."""
+    def with_faces(self, kept: IntArray) -> "MeshRepair":
+        """Return the mesh of the kept faces (k,), with the same vertices."""
         return replace(self, faces=self.faces[kept], old=self.old[kept])
 
-    def with_copies(self, copied: IntArray, faces: IntArray) -> "Draft":
-        """Return the draft with copies of some vertices (k,) behind the others, and faces (m, 3) that use them."""
+    def with_copies(self, copied: IntArray, faces: IntArray) -> "MeshRepair":
+        """Return the mesh with copies of some vertices (k,) behind the others, and faces (m, 3) that use them."""
         vertices, points = (np.concatenate([rows, rows[copied]]) for rows in (self.vertices, self.points))
         return replace(self, vertices=vertices, points=points, faces=faces)
 
-    def with_patches(self, points: Array, faces: IntArray) -> "Draft":
-        """Return the draft with further vertices, points (k, 3) in the box, and further faces (t, 3)."""
+    def with_patches(self, points: Array, faces: IntArray) -> "MeshRepair":
+        """Return the mesh with further vertices, points (k, 3) in the box, and further faces (t, 3)."""
         return replace(
             self,
             vertices=np.concatenate([self.vertices, points * self.size + self.middle]),
@@ -45,8 +45,8 @@ class Draft:
             old=np.concatenate([self.old, np.full(len(faces), -1)]),
         )
 
-    def compact(self) -> "Draft":
-        """Return the draft without the vertices that no face uses."""
+    def compact(self) -> "MeshRepair":
+        """Return the mesh without the vertices that no face uses."""
         kept, numbers = np.unique(self.faces, return_inverse=True)
         faces = numbers.reshape(-1, 3).astype(np.int64)
         return replace(self, vertices=self.vertices[kept], points=self.points[kept], faces=faces)
