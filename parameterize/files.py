@@ -1,9 +1,12 @@
-"""Array files: atomic writing and guarded reading of .npz, without pickles."""
+"""Files: atomic writing, guarded reading of .npz without pickles, unpacking of .gz within a limit."""
 
+import gzip
+import io
 import math
 import os
 import warnings
 import zipfile
+import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from glob import escape
@@ -115,3 +118,12 @@ def _read_array(archive: zipfile.ZipFile, entry: zipfile.ZipInfo) -> NDArray[Any
             raise ValueError(f"{entry.filename} does not have the size its header says")
     with archive.open(entry) as stream:
         return np.asarray(npy.read_array(stream, allow_pickle=False))
+
+
+def gunzip(packed: bytes, most: int) -> bytes:
+    """Return what is packed by gzip, of which at most `most` + 1 bytes are unpacked. Raises ValueError for damage."""
+    try:
+        with gzip.open(io.BytesIO(packed)) as stream:
+            return stream.read(most + 1)
+    except (OSError, EOFError, zlib.error) as error:
+        raise ValueError(f"not a whole .gz file ({error})") from None

@@ -33,6 +33,7 @@ from iga_nn.cli.commands import main
 from iga_nn.report import document as report
 from iga_nn.workflow.regions import check_regions
 from parameterize.surface.readers import cad
+from parameterize.surface.readers.common import SurfaceFile
 from parameterize.surface.surface import MeshError, bodies_in, load_surface
 
 VOLUME = 6 * 4 * 1 + 1 * 4 * 4 + 0.5 * pi * 2**2  # foot, wall, half a disc at the end
@@ -443,7 +444,7 @@ def found(monkeypatch):
         labels = np.stack([np.repeat(np.arange(1, 7), 2), np.ones(12, dtype=int)], axis=1)
         arrays = {"vertices": CORNERS, "faces": ROWS, "labels": labels}
         monkeypatch.setattr(cad, "_run", lambda *asked: (arrays, FACTS | facts))
-        return cad.read_step(of(box()), 1000)
+        return cad.read_step(SurfaceFile(of(box()), 1000, None))
 
     return find
 

@@ -41,7 +41,25 @@ def test_animations_are_left_out_with_a_notice(tmp_path):
         }
     ]
     surface = read(tmp_path, gltf)
-    check(surface, 27, (0, 0, 0), (1.5, 3, 6), "left out 1 animations: the scene is read at rest")
+    check(surface, 27, (0, 0, 0), (1.5, 3, 6), "left out 1 animation: the scene is read at rest")
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "said"),
+    [
+        ("asset", {"version": "1.0"}, "glTF version 1.0 is not supported: save it as 2.0"),
+        ("asset", "2.0", "a part of its description is not what the format says"),
+        ("meshes", [{}], "its description lacks 'primitives'"),
+        ("nodes", [{"mesh": 0, "matrix": "none"}], "a part of its description is not what the format says"),
+        ("nodes", [0], "a part of its description is not what the format says"),
+    ],
+)
+def test_a_description_that_is_not_as_the_format_says_is_refused_in_its_words(key, value, said, tmp_path):
+    gltf = Gltf()
+    gltf.document[key] = value
+    with pytest.raises(MeshError, match=said) as error:
+        read(tmp_path, gltf)
+    assert "Error" not in str(error.value) and "object" not in str(error.value)
 
 
 def test_two_primitives_share_vertices(tmp_path):
@@ -62,9 +80,9 @@ def test_primitives_without_indices_take_their_vertices_in_order(tmp_path):
 @pytest.mark.parametrize(
     ("more", "said"),
     [
-        ({"attributes": {}}, "left out 1 primitives without positions"),
-        ({"mode": 1}, "left out 1 lines"),
-        ({"mode": 3, "extensions": {"KHR_draco_mesh_compression": {}}}, "left out 1 line strips"),
+        ({"attributes": {}}, "left out 1 primitive without positions"),
+        ({"mode": 1}, "left out 1 line"),
+        ({"mode": 3, "extensions": {"KHR_draco_mesh_compression": {}}}, "left out 1 line strip"),
     ],
 )
 def test_primitives_without_triangles_are_left_out(more, said, tmp_path):

@@ -19,7 +19,7 @@ def with_nodes(*nodes, **document):
 
 BODY = ((0, 0, 0), (1, 2, 4))
 APART = {"mesh": 0, "translation": [50, 0, 0]}
-OUTSIDE = "left out 1 nodes with meshes that are outside the scene"
+OUTSIDE = "left out 1 node with a mesh, outside the scene"
 
 
 @pytest.mark.parametrize(
@@ -90,13 +90,13 @@ def test_nodes_that_are_not_visible_are_left_out_with_those_below(tmp_path):
     below = {"mesh": 0, "extensions": {"KHR_node_visibility": {"visible": True}}}
     gltf = with_nodes({}, {**APART, **unseen, "children": [2]}, below, scenes=[{"nodes": [0, 1]}])
     gltf.document["extensionsRequired"] = ["KHR_node_visibility"]
-    said = "left out 2 nodes with meshes that are not visible (KHR_node_visibility)"
+    said = "left out 2 nodes with a mesh, not visible (KHR_node_visibility)"
     check(read(tmp_path, gltf), 8, *BODY, said)
 
 
 def test_a_scene_where_all_is_hidden_says_so(tmp_path):
     unseen = {"extensions": {"KHR_node_visibility": {"visible": False}}}
-    with pytest.raises(MeshError, match="has no triangles; left out 1 nodes with meshes that are not visible"):
+    with pytest.raises(MeshError, match="has no triangles; left out 1 node with a mesh, not visible"):
         read(tmp_path, with_nodes(unseen))
     with pytest.raises(MeshError, match=f"has no triangles; {OUTSIDE}: export the surface"):
         read(tmp_path, with_nodes({}, scenes=[{"nodes": []}]))
@@ -109,11 +109,11 @@ def test_a_joint_that_is_not_visible_still_moves(tmp_path):
 
 @pytest.mark.parametrize(
     ("scenes", "said"),
-    [([], "are coarser levels of detail (MSFT_lod)"), ([{"nodes": [0]}], "are outside the scene")],
+    [([], "a coarser level of detail (MSFT_lod)"), ([{"nodes": [0]}], "outside the scene")],
 )
 def test_the_finest_level_is_read(scenes, said, tmp_path):
     gltf = with_nodes({"extensions": {"MSFT_lod": {"ids": [1]}}}, APART, scenes=scenes, extensionsUsed=["MSFT_lod"])
-    check(read(tmp_path, gltf), 8, *BODY, f"left out 1 nodes with meshes that {said}")
+    check(read(tmp_path, gltf), 8, *BODY, f"left out 1 node with a mesh, {said}")
 
 
 @pytest.mark.parametrize("listed", [{}, {"extensionsUsed": [INSTANCES]}, {"extensionsRequired": [INSTANCES]}])
@@ -158,7 +158,7 @@ def test_a_target_is_added_to_each_instance_and_a_mirrored_one_is_the_right_way_
 
 def test_instances_without_a_mesh_do_not_pass_in_silence(tmp_path):
     gltf = with_nodes({}, {"extensions": {INSTANCES: {"attributes": {}}}})
-    check(read(tmp_path, gltf), 8, *BODY, "left out 1 sets of instances without a mesh")
+    check(read(tmp_path, gltf), 8, *BODY, "left out 1 set of instances without a mesh")
 
 
 def test_instances_that_contradict_themselves_are_refused(tmp_path):

@@ -22,6 +22,7 @@ from reader_files import (
     vertices,
 )
 
+from parameterize.surface.readers.common import SurfaceFile
 from parameterize.surface.readers.ply import read_ply
 from parameterize.surface.surface import MeshError, load_surface
 
@@ -80,7 +81,7 @@ def test_lists_of_every_type_are_read(form):
     """The corners as they are written; that a surface is made of them is tested once a form above."""
     for count, item, rows in itertools.product(TYPES, TYPES, (MIXED, QUADS, TRIANGLES)):
         content = Ply(vertices(), faces(rows, [f"list {count} {item} vertex_indices"])).content(form)
-        found = read_ply(content, max_faces=12)
+        found = read_ply(SurfaceFile(content, 12, None))
         assert np.array_equal(found.vertices, CUBE), (count, item)
         assert found.polygons == [list(row) for row in rows], (count, item)
 

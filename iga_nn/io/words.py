@@ -1,14 +1,12 @@
 """Reads a text file of numbers word by word, and says at which line something is wrong."""
 
-import gzip
-import zlib
 from collections.abc import Iterator
 from pathlib import Path
-from typing import BinaryIO, cast
 
 import numpy as np
 
 from parameterize.arrays import Array
+from parameterize.files import gunzip
 
 MAX_BYTES = 128 << 20
 PACKED = b"\x1f\x8b"  # the first bytes of gzip
@@ -22,24 +20,18 @@ def text_of(path: Path) -> str:
     """
     if (size := path.stat().st_size) > MAX_BYTES:
         raise ValueError(f"has {size} bytes, more than {MAX_BYTES}")
-    try:
-        with _opened(path) as stream:
-            content = stream.read(MAX_BYTES + 1)
-    except (EOFError, zlib.error, gzip.BadGzipFile) as error:
-        raise ValueError(f"is not a whole .gz file ({error}): save it again") from None
+    content = path.read_bytes()
+    if content.startswith(PACKED):
+        try:
+            content = gunzip(content, MAX_BYTES)
+        except ValueError as error:
+            raise ValueError(f"is {error}: save it again") from None
     if len(content) > MAX_BYTES:
         raise ValueError(f"has more than {MAX_BYTES} bytes once it is unpacked")
     try:
         return content.decode("utf-8-sig")
     except UnicodeDecodeError:
         return content.decode("latin-1")
-
-
-def _opened(path: Path) -> BinaryIO:
-    """Return the bytes of a file as a stream, unpacked where they are packed by gzip. Raises OSError."""
-    with path.open("rb") as stream:
-        is_packed = stream.read(len(PACKED)) == PACKED
-    return cast(BinaryIO, gzip.open(path)) if is_packed else path.open("rb")
 
 
 class Words:

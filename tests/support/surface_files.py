@@ -53,7 +53,7 @@ ACCEPTED = {
         glb(gltf(extensionsUsed=["KHR_draco_mesh_compression"])),
         "read the plain arrays beside those that KHR_draco_mesh_compression compresses",
     ),
-    "animated.glb": (glb(gltf(animations=[{}])), "left out 1 animations: the scene is read at rest"),
+    "animated.glb": (glb(gltf(animations=[{}])), "left out 1 animation: the scene is read at rest"),
     "model.3mf": (threemf(model(build='<item objectid="1"/>', unit="meter")), None),
     "unnamed.3mf": (
         threemf_files.archive(

@@ -3,15 +3,13 @@
 import io
 import zipfile
 import zlib
-from collections.abc import Callable
 from pathlib import Path, PurePosixPath
 from urllib.parse import unquote
 
 from ..errors import MeshError
-from .common import DAMAGED
+from .common import DAMAGED, Beside
 
 MOST_MEMBERS = 10_000
-Beside = Callable[[str], bytes]  # from the name that a file gives to another one to its content; raises MeshError
 
 
 class Archive:

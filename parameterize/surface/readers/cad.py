@@ -22,7 +22,7 @@ import numpy as np
 from ..errors import MeshError, check_face_count
 from ..groups import gathered
 from .cad_units import Unit, iges_unit, step_unit
-from .common import DAMAGED, Content
+from .common import DAMAGED, Content, SurfaceFile
 
 INSTALL = "pip install 'iga-nn[cad]'"
 PROGRAM = Path(__file__).with_name("opencascade.py")
@@ -52,27 +52,24 @@ KINDS = (
 )
 
 
-def read_step(data: bytes, max_faces: int, deflection: float | None = None) -> Content:
-    """Read the solids of a .step, or its faces where it has none. Lengths are in the file's unit.
-
-    deflection: largest distance of the triangles from curved faces, in that unit.
-    """
-    if b"ISO-10303-21" not in data[:4096]:
+def read_step(file: SurfaceFile) -> Content:
+    """Read the solids of a .step, or its faces where it has none. Lengths are in the file's unit."""
+    if b"ISO-10303-21" not in file.data[:4096]:
         raise MeshError(f"not a STEP file: it does not begin with ISO-10303-21; {DAMAGED}")
-    return _read(data, "step", step_unit(data), max_faces, deflection)
+    return _read(file, "step", step_unit(file.data))
 
 
-def read_iges(data: bytes, max_faces: int, deflection: float | None = None) -> Content:
+def read_iges(file: SurfaceFile) -> Content:
     """Read a .iges as `read_step` reads a .step."""
-    return _read(data, "iges", iges_unit(data), max_faces, deflection)
+    return _read(file, "iges", iges_unit(file.data))
 
 
-def _read(data: bytes, kind: str, unit: Unit, max_faces: int, deflection: float | None) -> Content:
+def _read(file: SurfaceFile, kind: str, unit: Unit) -> Content:
     """Return the bodies of a file in its unit. Raises MeshError where there are none."""
-    arrays, facts = _run(data, kind, deflection, unit)
-    left_out = Counter(facts["left_out"]) + (passed_over(data) if kind == "step" else Counter())
+    arrays, facts = _run(file.data, kind, file.deflection, unit)
+    left_out = Counter(facts["left_out"]) + (passed_over(file.data) if kind == "step" else Counter())
     _check(facts, len(arrays["faces"]), left_out)
-    check_face_count(len(arrays["faces"]), max_faces)
+    check_face_count(len(arrays["faces"]), file.max_faces)
     faces, owners = arrays["labels"].T
     groups = gathered((f"face{value}", np.flatnonzero(faces == value)) for value in np.unique(faces).tolist())
     names = facts["names"]

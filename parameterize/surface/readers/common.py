@@ -3,7 +3,7 @@
 import io
 import logging
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from dataclasses import dataclass, field
 from typing import Any
@@ -23,6 +23,21 @@ NUMBERS = re.compile(rf"{NUMBER}(?: {NUMBER})*+", re.ASCII | re.IGNORECASE)
 WHOLE_NUMBERS = re.compile(r"[-+]?\d{1,18}(?: [-+]?\d{1,18})*+", re.ASCII)
 
 Solids = tuple[tuple[str, IntArray], ...]  # names and face numbers
+Beside = Callable[[str], bytes]  # from the name that a file gives to another one to its content; raises MeshError
+
+
+@dataclass(frozen=True, eq=False)
+class SurfaceFile:
+    """The bytes of a surface file, unpacked, and how they are read.
+
+    max_faces: the most faces that it may have. beside: reads the files that it names. deflection: of a solid model, the
+    largest distance of the triangles from curved faces, in the file's unit; None for the usual one.
+    """
+
+    data: bytes
+    max_faces: int
+    beside: Beside
+    deflection: float | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,9 +1,6 @@
 """Reading a surface file: its bytes within a limit, the reader of its format, checks, triangles."""
 
-import gzip
 import hashlib
-import io
-import zlib
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import chain
@@ -12,12 +9,13 @@ from pathlib import Path
 import numpy as np
 
 from ...arrays import Array, IntArray
+from ...files import gunzip
 from ..errors import MeshError, check_face_count, check_finite, check_indices, without_unused_defects
 from ..groups import Groups, few, renumbered
 from ..triangulation import triangulate
-from .archive import Archive, Beside, in_archive, in_folder
+from .archive import Archive, in_archive, in_folder
 from .cad import read_iges, read_step
-from .common import DAMAGED, Content, Solids, most_bytes
+from .common import DAMAGED, Content, Solids, SurfaceFile, most_bytes
 from .gltf import read_glb, read_gltf
 from .gmsh import read_gmsh
 from .medit import read_medit
@@ -29,8 +27,8 @@ from .threemf import read_3mf
 from .vtk_legacy import read_vtk
 from .vtu import read_vtp, read_vtu
 
-# Each takes the bytes of a file, and how many faces it may have; MeshError, without the file's name, for a bad one.
-READERS: dict[str, Callable[[bytes, int], Content]] = {
+# Each raises MeshError, without the file's name, for a bad file.
+READERS: dict[str, Callable[[SurfaceFile], Content]] = {
     ".obj": read_obj,
     ".stl": read_stl,
     ".ply": read_ply,
@@ -41,17 +39,15 @@ READERS: dict[str, Callable[[bytes, int], Content]] = {
     ".vtp": read_vtp,
     ".vtk": read_vtk,
     ".3mf": read_3mf,
-}
-# The same, with the reader of the files that a file names.
-SCENES: dict[str, Callable[[bytes, int, Beside], Content]] = {".glb": read_glb, ".gltf": read_gltf}
-# The same, with the deflection of curved faces beside it.
-SOLID_MODELS: dict[str, Callable[[bytes, int, float | None], Content]] = {
+    ".glb": read_glb,
+    ".gltf": read_gltf,
     ".step": read_step,
     ".stp": read_step,
     ".iges": read_iges,
     ".igs": read_iges,
 }
-FORMATS = (*READERS, *SCENES, *SOLID_MODELS)
+FORMATS = tuple(READERS)
+CURVED = (".step", ".stp", ".iges", ".igs")  # solid models, whose faces are curved
 PACKED = (".gz", ".zip")
 
 
@@ -98,14 +94,9 @@ def read_mesh(path: Path, max_faces: int, deflection: float | None = None) -> Ra
         beside = in_archive(archive, member)
     if not data.strip():
         raise MeshError("the file is empty: export it again")
-    if deflection is not None and suffix not in SOLID_MODELS:
-        raise MeshError(f"deflection is for {' '.join(SOLID_MODELS)}, whose faces are curved: leave --deflection out")
-    if suffix in SOLID_MODELS:
-        content = SOLID_MODELS[suffix](data, max_faces, deflection)
-    elif suffix in SCENES:
-        content = SCENES[suffix](data, max_faces, beside)
-    else:
-        content = READERS[suffix](data, max_faces)
+    if deflection is not None and suffix not in CURVED:
+        raise MeshError(f"deflection is for {' '.join(CURVED)}, whose faces are curved: leave --deflection out")
+    content = READERS[suffix](SurfaceFile(data, max_faces, beside, deflection))
     vertices, faces, notices, groups = triangles_of(content, max_faces)
     digest = hashlib.sha256(stored).hexdigest()
     return RawMesh(vertices, faces, digest, unpacked + notices, groups, content.unit, content.solids)
@@ -151,10 +142,9 @@ def _read_bytes(path: Path, limit: int) -> bytes:
 
 def _unpack(stored: bytes, limit: int) -> bytes:
     try:
-        with gzip.open(io.BytesIO(stored)) as stream:
-            data = stream.read(limit + 1)
-    except (OSError, EOFError, zlib.error) as error:
-        raise MeshError(f"not a whole .gz file ({error}); {DAMAGED}") from None
+        data = gunzip(stored, limit)
+    except ValueError as error:
+        raise MeshError(f"{error}; {DAMAGED}") from None
     if len(data) > limit:
         raise MeshError(f"unpacks to more than {limit} bytes: decimate the surface or raise --max-faces")
     return data

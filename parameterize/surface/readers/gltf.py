@@ -14,27 +14,26 @@ import numpy as np
 from ...arrays import Array, IntArray, Mask
 from ..errors import MeshError, check_face_count, check_indices
 from ..groups import gathered
-from .archive import Beside
-from .common import DAMAGED, Content
+from .common import DAMAGED, Content, SurfaceFile
 from .gltf_arrays import Arrays, item
 from .gltf_extensions import INSTANCES, compression_of, extension, unread
 from .gltf_nodes import Nodes, instance_count, instance_places
 from .gltf_shapes import joint_matrices, morphed, skinned, weights_of
 
-WITHOUT_AREA = {0: "points", 1: "lines", 2: "line loops", 3: "line strips"}
+WITHOUT_AREA = {0: "primitive{s} of points", 1: "line{s}", 2: "line loop{s}", 3: "line strip{s}"}  # by their modes
 TRIANGLES, STRIP, FAN = 4, 5, 6
 ARRAYS = ("POSITION", "JOINTS_", "WEIGHTS_")  # of a primitive, those that are read
 UNIT = "m"
 
 
-def read_glb(data: bytes, max_faces: int, beside: Beside) -> Content:
-    """Read a .glb. beside: reads the files that it names."""
-    return scene_of(*_chunks(data), max_faces, beside)
+def read_glb(file: SurfaceFile) -> Content:
+    """Read a .glb."""
+    return _scene_of(*_chunks(file.data), file)
 
 
-def read_gltf(data: bytes, max_faces: int, beside: Beside) -> Content:
-    """Read a .gltf. beside: reads the files that it names."""
-    return scene_of(data, b"", max_faces, beside)
+def read_gltf(file: SurfaceFile) -> Content:
+    """Read a .gltf."""
+    return _scene_of(file.data, b"", file)
 
 
 def _chunks(data: bytes) -> tuple[bytes, bytes]:
@@ -42,8 +41,7 @@ def _chunks(data: bytes) -> tuple[bytes, bytes]:
     if data[:4] != b"glTF" or len(data) < 20:
         raise MeshError(f"not a .glb: its first word is not glTF; {DAMAGED}")
     version, total = (int(number) for number in np.frombuffer(data, "<u4", 2, 4))
-    if version != 2:
-        raise MeshError(f"glTF version {version} is not supported: save it as 2.0")
+    _check_version(f"{version}.0")
     if total > len(data):
         raise MeshError(f"the .glb promises {total} bytes, it has {len(data)}; {DAMAGED}")
     found: dict[bytes, bytes] = {}
@@ -57,20 +55,36 @@ def _chunks(data: bytes) -> tuple[bytes, bytes]:
     return found[b"JSON"], found.get(b"BIN\0", b"")
 
 
-def scene_of(text: bytes, binary: bytes, max_faces: int, beside: Beside) -> Content:
+def _scene_of(text: bytes, binary: bytes, file: SurfaceFile) -> Content:
     """Return the triangles of a scene from its description, JSON, and the buffer that comes with it."""
     try:
         document = json.loads(text.decode("utf-8-sig"))
         if not isinstance(document, dict) or "asset" not in document:
             raise MeshError("is no glTF: its description has no asset; export it again")
+        _check_version(document["asset"].get("version", "2.0"))
         with np.errstate(all="ignore"):  # what is not finite is refused later
             notices = unread(document)
-            return _Scene(document, Arrays(document, binary, beside), Nodes(document), max_faces).content(notices)
+            arrays = Arrays(document, binary, file.beside)
+            return _Scene(document, arrays, Nodes(document), file.max_faces).content(notices)
     except (ValueError, KeyError, IndexError, TypeError, AttributeError, RecursionError, OverflowError) as error:
         if isinstance(error, MeshError):
             raise
-        said = " ".join(str(error).split())[:80]
-        raise MeshError(f"not readable as glTF ({type(error).__name__} {said}); {DAMAGED}") from None
+        raise MeshError(f"not readable as glTF ({_in_words(error)}); {DAMAGED}") from None
+
+
+def _check_version(version: object) -> None:
+    """Raise MeshError for the version of another glTF: others are built in other ways."""
+    if not str(version).startswith("2."):
+        raise MeshError(f"glTF version {str(version):.20} is not supported: save it as 2.0")
+
+
+def _in_words(error: Exception) -> str:
+    """Return what is wrong with a description, whose parts are taken to be as the format says until one is not."""
+    if isinstance(error, json.JSONDecodeError | UnicodeDecodeError):
+        return f"its description is no JSON: {' '.join(str(error).split())[:80]}"
+    if isinstance(error, KeyError):
+        return f"its description lacks {str(error.args[0])[:40]!r}"
+    return "a part of its description is not what the format says"
 
 
 @dataclass
@@ -94,13 +108,13 @@ class _Scene:
         meshes = {number for number, node in enumerate(self.nodes.rows) if "mesh" in node}
         for number, names, hidden in self.nodes.walk():
             if number in meshes and hidden:
-                self.left_out[f"nodes with meshes that {hidden}"] += 1
+                self.left_out[f"node{{s}} with a mesh, {hidden}"] += 1
             else:
                 self._visit(number, names)
             meshes.discard(number)
-        self.left_out["nodes with meshes that are outside the scene"] += len(meshes)
-        self.left_out["animations: the scene is read at rest"] += len(self.document.get("animations", []))
-        left_out = [f"left out {count} {kind}" for kind, count in self.left_out.items() if count]
+        self.left_out["node{s} with a mesh, outside the scene"] += len(meshes)
+        self.left_out["animation{s}: the scene is read at rest"] += len(self.document.get("animations", []))
+        left_out = [f"left out {n} {kind.format(s='s' * (n != 1))}" for kind, n in self.left_out.items() if n]
         if not self.faces:
             raise MeshError(f"has no triangles{'; ' * bool(left_out)}{', '.join(left_out)}: export the surface")
         polygons = np.concatenate(self.faces).tolist()
@@ -110,7 +124,7 @@ class _Scene:
         """Take the mesh of a node, where it has one."""
         node = self.nodes.node(number)
         if "mesh" not in node:
-            self.left_out["sets of instances without a mesh"] += bool(extension(node, INSTANCES))
+            self.left_out["set{s} of instances without a mesh"] += bool(extension(node, INSTANCES))
             return
         if "skin" in node and extension(node, INSTANCES):
             raise MeshError(f"instances ({INSTANCES}) of a skinned mesh have no meaning: export it without one of them")
@@ -119,7 +133,7 @@ class _Scene:
             if mode in WITHOUT_AREA:
                 self.left_out[WITHOUT_AREA[mode]] += 1
             elif "POSITION" not in primitive["attributes"]:
-                self.left_out["primitives without positions"] += 1
+                self.left_out["primitive{s} without positions"] += 1
             else:
                 self._take(primitive, number, names)
 

@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 
 from ...arrays import IntArray
 from ..errors import MeshError
-from .archive import Beside
-from .common import DAMAGED
+from .common import DAMAGED, Beside
 from .gltf_extensions import compression_of
 
 # By componentType; the last one by KHR_accessor_float64.

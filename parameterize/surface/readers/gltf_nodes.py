@@ -59,9 +59,9 @@ class Nodes:
             node = self.node(number)
             names = (*above, str(node.get("name", "")))
             if not extension(node, VISIBILITY).get("visible", True):
-                hidden = hidden or f"are not visible ({VISIBILITY})"
+                hidden = hidden or f"not visible ({VISIBILITY})"
             elif number in self.coarser:
-                hidden = hidden or f"are coarser levels of detail ({LEVELS})"
+                hidden = hidden or f"a coarser level of detail ({LEVELS})"
             yield number, names, hidden
             stack += [(child, names, hidden) for child in reversed(node.get("children", []))]
 

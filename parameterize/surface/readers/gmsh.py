@@ -11,7 +11,7 @@ import numpy as np
 from ...arrays import Array, IntArray
 from ..errors import MeshError
 from .cells import Rows, from_cells
-from .common import DAMAGED, Content
+from .common import DAMAGED, Content, SurfaceFile
 from .gmsh_groups import Physical, groups_of, physical_names, physical_of_entities
 from .words import Binary, Source, Text
 
@@ -29,12 +29,12 @@ Found = tuple[IntArray, Array]  # numbers (n,) and places (n, 3) of nodes
 Block = tuple[int, IntArray, IntArray]  # Gmsh's type of elements, their nodes (k, nodes), entity or physical group (k,)
 
 
-def read_gmsh(data: bytes, _: int) -> Content:
+def read_gmsh(file: SurfaceFile) -> Content:
     """Read nodes and elements; nodes may be numbered in any way."""
-    sections = dict(_sections(data))
+    sections = dict(_sections(file.data))
     form = FORMAT.match(sections.get(b"MeshFormat", b""))
     if not form:
-        if re.search(rb"^\$NOD\b", data, re.MULTILINE):
+        if re.search(rb"^\$NOD\b", file.data, re.MULTILINE):
             raise MeshError("Gmsh format 1 is not supported: save as Gmsh 4.1 or 2.2")
         raise MeshError("not a .msh: no $MeshFormat; save as Gmsh 4.1")
     version = form[1].decode("latin-1")

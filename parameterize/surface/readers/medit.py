@@ -9,7 +9,7 @@ from ...arrays import IntArray
 from ..errors import MeshError, check_indices
 from ..groups import by_value
 from .cells import from_cells
-from .common import DAMAGED, NUMBERS, WHOLE_NUMBERS, Content, header_count, text_lines
+from .common import DAMAGED, NUMBERS, WHOLE_NUMBERS, Content, SurfaceFile, header_count, text_lines
 
 ASIDE = re.compile(r'#[^\n]*|"[^"\n]*"')  # comments, and names of other files
 KEYWORD = re.compile(r"(?<!\S)([A-Z][A-Za-z]{2,}\d?)(?!\S)")
@@ -19,9 +19,9 @@ CELLS |= {"Hexaedra": CELLS["Hexahedra"]}  # so written by some programs
 CURVED = re.compile(r"(Triangle|Quadrilateral|Tetrahedra|Pyramid|Prism|Hexahedra)s?[PQ]\d")
 
 
-def read_medit(data: bytes, _: int) -> Content:
+def read_medit(file: SurfaceFile) -> Content:
     """Read vertices and cells of a .mesh text of dimension 3."""
-    before, *parts = KEYWORD.split(ASIDE.sub(" ", "\n".join(text_lines(data))))
+    before, *parts = KEYWORD.split(ASIDE.sub(" ", "\n".join(text_lines(file.data))))
     if before.strip() or parts[:1] != ["MeshVersionFormatted"]:
         raise MeshError("not a .mesh: expected the text format that starts with MeshVersionFormatted")
     vertices = np.empty((0, 3))

@@ -12,7 +12,7 @@ import numpy as np
 
 from ..errors import MeshError
 from ..groups import Groups, gathered
-from .common import Content, coordinates, corners, text_lines
+from .common import Content, SurfaceFile, coordinates, corners, text_lines
 
 FACES = ("f", "fo")
 PATCHES = ("surf", "bsp", "bzp", "call")  # free-form surfaces, and other files
@@ -23,9 +23,9 @@ SKIPPED |= {"trace_obj", "c_interp", "d_interp", "ctech", "stech", "cstype", "de
 LISTED = 5  # kinds of records left out
 
 
-def read_obj(data: bytes, _: int) -> Content:
+def read_obj(file: SurfaceFile) -> Content:
     """Read the records `v x y z` and `f a b c ...`; negative vertex numbers count back from the last vertex so far."""
-    if b"\0" in data:
+    if b"\0" in file.data:
         raise MeshError("not an OBJ: it holds binary data; export as OBJ text")
     places = array("d")
     polygons: list[list[int]] = []
@@ -33,7 +33,7 @@ def read_obj(data: bytes, _: int) -> Content:
     relative = False
     highest, highest_line = 0, 0
     left_out: Counter[str] = Counter()
-    for line, words in _records(text_lines(data)):
+    for line, words in _records(text_lines(file.data)):
         if words[:1] == ["v"]:
             places.extend(coordinates(words[1:], line))
         elif words and words[0] in FACES:
@@ -59,7 +59,7 @@ def read_obj(data: bytes, _: int) -> Content:
         )
     if highest > len(vertices):
         raise _out_of_range(highest, highest_line, len(vertices))
-    notices = ["byte order mark skipped"] if data.startswith(b"\xef\xbb\xbf") else []
+    notices = ["byte order mark skipped"] if file.data.startswith(b"\xef\xbb\xbf") else []
     notices += ["negative (relative) vertex numbers resolved"] if relative else []
     if left_out:
         listed = ", ".join(f"{count} {ascii(word[:20])}" for word, count in left_out.most_common(LISTED))

@@ -12,7 +12,7 @@ from itertools import product
 import numpy as np
 
 from ..errors import MeshError, check_face_count
-from .common import DAMAGED, Content, coordinates, corners, header_count, text_lines
+from .common import DAMAGED, Content, SurfaceFile, coordinates, corners, header_count, text_lines
 
 HEADER = re.compile(r"(ST)?(C)?(N)?(4)?(n)?OFF")
 
@@ -44,13 +44,13 @@ class OffWords:
         return self.lines[min(self.at, len(self.lines) - 1)]
 
 
-def read_off(data: bytes, max_faces: int) -> Content:
+def read_off(file: SurfaceFile) -> Content:
     """Read an OFF, COFF, NOFF or STOFF text, or a mixture of these; comments are skipped."""
-    rows = [(number, line.split("#", 1)[0].split()) for number, line in enumerate(text_lines(data), 1)]
+    rows = [(number, line.split("#", 1)[0].split()) for number, line in enumerate(text_lines(file.data), 1)]
     words = OffWords([word for _, row in rows for word in row], [number for number, row in rows for _ in row])
     besides = _header(words)
     n, m = _counts(words)
-    check_face_count(m, max_faces)
+    check_face_count(m, file.max_faces)
     start, left = words.at, len(words.words) - words.at
     if left < 3 * n + 4 * m:
         raise MeshError(

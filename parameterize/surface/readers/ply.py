@@ -14,7 +14,7 @@ from ...arrays import Array, IntArray
 from ..errors import MeshError, check_face_count
 from ..groups import Groups, by_value, renumbered
 from .cells import triangles_of_strips
-from .common import DAMAGED, WHOLE_NUMBERS, Content, coordinates, corners, header_count, text_lines
+from .common import DAMAGED, WHOLE_NUMBERS, Content, SurfaceFile, coordinates, corners, header_count, text_lines
 from .ply_elements import Element, binary_rows, elements_of
 
 NEWLINE = rb"(\r\n|\r|\n)"
@@ -27,9 +27,9 @@ Found = tuple[Array, list[list[int]], Groups]  # places (n, 3), polygons and the
 READ = ("vertex", "face", "tristrips")
 
 
-def read_ply(data: bytes, max_faces: int) -> Content:
+def read_ply(file: SurfaceFile) -> Content:
     """Read a PLY; a header that promises more than the file holds is refused before the rows are read."""
-    data = data.removeprefix(b"\xef\xbb\xbf")
+    data = file.data.removeprefix(b"\xef\xbb\xbf")
     begin, end = BEGIN.match(data), END.search(data)
     if not begin or not end:
         raise MeshError(f"not a PLY: no header from 'ply' to 'end_header'; {DAMAGED}")
@@ -42,7 +42,7 @@ def read_ply(data: bytes, max_faces: int) -> Content:
     if not counts.get("vertex") or not (counts.get("face") or counts.get("tristrips")):
         found = f"{counts.get('vertex', 0)} vertices and {counts.get('face', 0)} faces"
         raise MeshError(f"the PLY holds {found}, a surface needs both: export the faces too")
-    check_face_count(counts.get("face", 0), max_faces)
+    check_face_count(counts.get("face", 0), file.max_faces)
     ends = re.match(begin[1] + b"|" + NEWLINE + b"|", data[end.end() : end.end() + 2])  # first as the first line
     body = data[end.end() + (ends.end() if ends else 0) :]
     if ORDERS[forms[0]]:

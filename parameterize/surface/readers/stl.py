@@ -11,17 +11,18 @@ import numpy as np
 
 from ..errors import MeshError, check_face_count
 from ..groups import Groups, gathered
-from .common import DAMAGED, Content, library
+from .common import DAMAGED, Content, SurfaceFile, library
 
 SOLID = re.compile(rb"^[ \t]*((?:end)?solid)\b(.*)$", re.IGNORECASE | re.MULTILINE)
 ENDED = re.compile(rb"\bendfacet\b", re.IGNORECASE)
 BEFORE = 4096  # bytes in which the first solid begins
 
 
-def read_stl(data: bytes, max_faces: int) -> Content:
+def read_stl(file: SurfaceFile) -> Content:
     """Read the triangles of an STL whose size or number of corners fits its facets; each has vertices of its own."""
     import trimesh
 
+    data = file.data
     promised = int.from_bytes(data[80:84], "little")
     expected = 84 + 50 * promised
     is_binary = len(data) == expected
@@ -33,7 +34,7 @@ def read_stl(data: bytes, max_faces: int) -> Content:
         raise MeshError(f"not an STL: {len(data)} bytes, the header alone takes 84; {DAMAGED}")
     elif not is_binary:
         raise MeshError(f"STL of {promised} triangles must have {expected} bytes, this one has {len(data)}; {DAMAGED}")
-    check_face_count(promised, max_faces)
+    check_face_count(promised, file.max_faces)
     with library(".stl"):
         mesh = trimesh.load_mesh(io.BytesIO(text), file_type="stl", process=False)
         vertices, triangles = np.array(mesh.vertices, dtype=np.float64), mesh.faces.tolist()

@@ -12,7 +12,7 @@ from ...arrays import Array
 from ..errors import MeshError, check_face_count
 from ..groups import gathered
 from .archive import Archive
-from .common import DAMAGED, Content, most_bytes
+from .common import DAMAGED, Content, SurfaceFile, most_bytes
 from .threemf_extensions import makes_another_body, name_of
 from .threemf_model import FULL, ModelPart, Object, Reference, read_model
 from .threemf_package import Package, check_notes
@@ -27,12 +27,12 @@ LEFT_OUT = ("support", "solidsupport", "surface")
 SHOWN = 3  # elements in a notice
 
 
-def read_3mf(data: bytes, max_faces: int) -> Content:
+def read_3mf(file: SurfaceFile) -> Content:
     """Read a .3mf."""
-    package = Package(Archive(data, most_bytes(max_faces)))
+    package = Package(Archive(file.data, most_bytes(file.max_faces)))
     root, notices = package.model()
     check_notes(package)
-    built = _Built(package, root, max_faces)
+    built = _Built(package, root, file.max_faces)
     built.take_items()
     notices += tuple(built.notices())
     if not built.faces:

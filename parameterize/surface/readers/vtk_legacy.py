@@ -14,7 +14,7 @@ from ...arrays import IntArray
 from ..errors import MeshError
 from ..groups import by_value
 from .cells import Rows, from_cells
-from .common import DAMAGED, Content, header_count, number_array
+from .common import DAMAGED, Content, SurfaceFile, header_count, number_array
 from .vtu import PARTS, by_kind
 
 TYPES = {"float": "f4", "double": "f8", "char": "i1", "unsigned_char": "u1", "short": "i2", "unsigned_short": "u2"}
@@ -25,8 +25,9 @@ WORD = re.compile(rb"\s*(\S+)")
 LINE = re.compile(rb"[^\n]*\n?")
 
 
-def read_vtk(data: bytes, max_faces: int) -> Content:
+def read_vtk(file: SurfaceFile) -> Content:
     """Read a .vtk that holds POLYDATA or an UNSTRUCTURED_GRID."""
+    data = file.data
     head = data[:1024].split(b"\n", 3)
     if len(head) < 4 or not head[0].startswith(b"# vtk DataFile Version"):
         raise MeshError(f"not a .vtk: its first line is not '# vtk DataFile Version'; {DAMAGED}")

@@ -13,7 +13,7 @@ from ...arrays import Array, IntArray
 from ..errors import MeshError, check_indices
 from ..groups import Groups, by_value
 from .cells import Rows, from_cells
-from .common import DAMAGED, Content, header_count, most_bytes
+from .common import DAMAGED, Content, SurfaceFile, header_count, most_bytes
 from .vtk_arrays import TYPES, WORDS, Decoder
 
 KINDS = {0: "empty", 1: "vertex", 2: "poly_vertex", 3: "line", 4: "poly_line", 5: "triangle", 6: "triangle_strip"}
@@ -24,30 +24,31 @@ Marks = dict[str, NDArray[Any]]  # by the name of an array, a number of each cel
 APPENDED = re.compile(rb"<AppendedData\b([^>]*)>\s*_?")
 
 
-def read_vtu(data: bytes, max_faces: int) -> Content:
+def read_vtu(file: SurfaceFile) -> Content:
     """Read a .vtu of any version of the format; where it has several pieces, points in the same place are joined."""
-    return _read(data, max_faces, ".vtu", "UnstructuredGrid", _piece)
+    return _read(file, ".vtu", "UnstructuredGrid", _piece)
 
 
-def read_vtp(data: bytes, max_faces: int) -> Content:
+def read_vtp(file: SurfaceFile) -> Content:
     """Read a .vtp as `read_vtu` reads a .vtu."""
-    return _read(data, max_faces, ".vtp", "PolyData", _polygons)
+    return _read(file, ".vtp", "PolyData", _polygons)
 
 
 Piece = tuple[Array, list[tuple[str, Rows]], Marks]
 
 
 def _read(
-    data: bytes, max_faces: int, suffix: str, kind: str, read_piece: Callable[[ElementTree.Element, Decoder], Piece]
+    file: SurfaceFile, suffix: str, kind: str, read_piece: Callable[[ElementTree.Element, Decoder], Piece]
 ) -> Content:
     """Read a file of that kind of data set, piece by piece."""
+    data = file.data
     if b"<VTKFile" not in data[:4096] or b"</VTKFile>" not in data[-256:]:
         raise MeshError(f"not a whole {suffix}: no <VTKFile> ... </VTKFile>; {DAMAGED}")
     if b"<!DOCTYPE" in data or b"<!ENTITY" in data:
         raise MeshError(
             f"the {suffix} declares a document type, whose entities are not expanded: remove the declaration"
         )
-    root, decoder = _opened(data, most_bytes(max_faces), suffix, kind)
+    root, decoder = _opened(data, most_bytes(file.max_faces), suffix, kind)
     steps = [grid.get("TimeValues", "").split() for grid in root.iter(kind)]
     notices = tuple(f"the first of {len(times)} time steps read" for times in steps if len(times) > 1)
     points, cells, marks = [np.empty((0, 3))], [], []
