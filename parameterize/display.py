@@ -28,7 +28,7 @@ class Brief:
     """A dataclass, declared with repr=False, that Python prints in one line: of arrays their shapes alone."""
 
     def __repr__(self) -> str:
-        parts = (f"{field.name}={_brief(getattr(self, field.name))}" for field in fields(self))  # type: ignore[arg-type]
+        parts = (f"{field.name}={_brief(getattr(self, field.name))}" for field in fields(self) if field.repr)  # type: ignore[arg-type]
         return f"{type(self).__name__}({', '.join(parts)})"
 
 

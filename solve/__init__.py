@@ -17,8 +17,12 @@ The formulas stand in docs/solver.md.
 True
 """
 
+from typing import Any
+
+from parameterize.old_names import renamed
+
 from .diagnostics import ConvergenceError as ConvergenceError
-from .field import MultiPatchField as MultiPatchField
+from .field import BodyField as BodyField
 from .field import SplineField as SplineField
 from .forms.elasticity import Elasticity as Elasticity
 from .forms.form import Form as Form
@@ -38,7 +42,7 @@ from .options import SolveOptions as SolveOptions
 from .options import check_device as check_device
 from .quantities import Extremes as Extremes
 from .reactions import Balance as Balance
-from .solution import MultiPatchSolution as MultiPatchSolution
+from .solution import PatchSolution as PatchSolution
 from .solution import Solution as Solution
 from .solution import SolveReport as SolveReport
 from .solver import check_problem as check_problem
@@ -51,3 +55,8 @@ from .study import benchmark_volume as benchmark_volume
 from .study import convergence as convergence
 from .study import rates as rates
 from .system import System as System
+
+
+def __getattr__(name: str) -> Any:
+    """Find a name of an earlier version (PEP 562)."""
+    return globals()[renamed("solve", name)]

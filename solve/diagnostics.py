@@ -20,7 +20,7 @@ from .forms.data import in_scaled
 from .forms.elasticity import Elasticity
 from .forms.parser import Expression, ExpressionError
 from .patch_system import PatchProblem, PatchSystem
-from .solution import MultiPatchSolution, Solution
+from .solution import Solution
 
 # Parameters per direction: the ends, and between them places without a pattern that a periodic formula could share.
 SAMPLES = np.concatenate([[0.0], np.sort(np.random.default_rng(0).uniform(0.0, 1.0, 7)), [1.0]])
@@ -54,7 +54,7 @@ class ConvergenceError(RuntimeError):
     1
     """
 
-    def __init__(self, message: str, solution: Solution | MultiPatchSolution | None = None) -> None:
+    def __init__(self, message: str, solution: Solution | None = None) -> None:
         super().__init__(message)
         self.solution = solution
 

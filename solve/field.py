@@ -1,9 +1,9 @@
-"""Defines SplineField, a function of the parameters as solution.npz stores it, and points with known parameters."""
+"""Defines the functions on a body as solution.npz stores them, and points with known parameters."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,7 +12,7 @@ from parameterize.arrays import Array, Knots
 from parameterize.display import Brief
 from parameterize.files import array_names, load_arrays, save_arrays
 from parameterize.quality.distances import nearest_on_boundary
-from parameterize.spline.body import Body, BodyLike
+from parameterize.spline.body import Body, BodyLike, all_control_points
 from parameterize.spline.bspline import evaluate_at, evaluate_grid
 from parameterize.spline.sampled_boundary import SampledBoundary
 from parameterize.spline.volume import BSplineVolume, checked_knots, load_spline, save_spline
@@ -53,9 +53,61 @@ class Points(np.ndarray[Any, Any]):
         return cls.of(np.moveaxis(volume.grid(u, v, w), -1, 0), (u, v, w))
 
 
+class FieldOnBody:
+    """Describe a function on a body: a SplineField on its only patch, or a BodyField with one on each patch."""
+
+    if TYPE_CHECKING:  # BodyField would take this property for the default of its own `patches`
+
+        @property
+        def patches(self) -> "tuple[SplineField, ...]":
+            """Return the function on each patch."""
+
+    @property
+    def on_body(self) -> Body:
+        """Return the body of the function. Raises ValueError where it is unknown."""
+        volumes = [patch.geometry for patch in self.patches]
+        if any(volume is None for volume in volumes):
+            raise ValueError(
+                "points in space require a field with a volume: dataclasses.replace(field, geometry=volume)"
+            )
+        return Body(tuple(volume for volume in volumes if volume is not None))
+
+    def probe(self, points: ArrayLike, *, clip: bool = False) -> Array:
+        """Return the values (m,) or (m, c) at points (m, 3) in space, in the body's units; NaN outside of the body.
+
+        clip: whether points outside have the value of the nearest point of the boundary. Raises ValueError for points
+        that are not finite or of another shape, and for a field without a volume.
+        """
+        body = self.on_body
+        owners, where = body.locate(points)
+        outside = owners < 0
+        if clip and outside.any():
+            beyond = np.atleast_2d(np.asarray(points, dtype=np.float64))[outside]
+            middle = all_control_points(body).mean(axis=0)
+            if np.abs(beyond - middle).max() > FARTHEST * body.size:
+                raise ValueError(
+                    f"a point lies more than {FARTHEST:g} times the volume's size away: its nearest point is not found"
+                )
+            owners[outside], where[outside], _ = nearest_on_boundary(beyond, body, SampledBoundary.of(body))
+        values = np.full((len(where), *self.patches[0].coefficients.shape[3:]), np.nan)
+        for number, patch in enumerate(self.patches):
+            own = owners == number
+            if own.any():
+                values[own] = patch(where[own])
+        return values
+
+    def at(self, x: Array) -> Array:
+        """Return the values (...) or (c, ...) at points x (3, ...) of the solver, as a law or a datum receives them."""
+        raise NotImplementedError
+
+    def fits(self, body: Body) -> bool:
+        """Return whether the field may be a datum on a body: its own patches are those of the body, or unknown."""
+        return len(self.patches) == len(body) and all(map(_is_on, self.patches, body))
+
+
 @dataclass(frozen=True, eq=False, repr=False)
-class SplineField(Brief):
-    """Evaluate a function of the parameters.
+class SplineField(Brief, FieldOnBody):
+    """Evaluate a function of the parameters of one patch.
 
     Parameters
     ----------
@@ -98,30 +150,10 @@ class SplineField(Brief):
         """Return the values (m,) or (m, c) at parameters (m, 3)."""
         return evaluate_at(self.degrees, self.knots, self.coefficients, points)
 
-    def probe(self, points: ArrayLike, *, clip: bool = False) -> Array:
-        """Return the values (m,) or (m, c) at points (m, 3) in space, in the volume's units; NaN outside of the volume.
-
-        clip: whether points outside have the value of the nearest point of the boundary. Raises ValueError for points
-        that are not finite or of another shape, and for a field without a volume.
-        """
-        if self.geometry is None:
-            raise ValueError(
-                "points in space require a field with a volume: dataclasses.replace(field, geometry=volume)"
-            )
-        where = self.geometry.locate(points)
-        outside = np.isnan(where[:, 0])
-        if clip and outside.any():
-            beyond = np.atleast_2d(np.asarray(points, dtype=np.float64))[outside]
-            middle = self.geometry.control_points.mean(axis=(0, 1, 2))
-            if np.abs(beyond - middle).max() > FARTHEST * np.ptp(self.geometry.control_points, axis=(0, 1, 2)).max():
-                raise ValueError(
-                    f"a point lies more than {FARTHEST:g} times the volume's size away: its nearest point is not found"
-                )
-            _, where[outside], _ = nearest_on_boundary(beyond, self.geometry, SampledBoundary.of(self.geometry))
-            outside[:] = False
-        values = np.full((len(where), *self.coefficients.shape[3:]), np.nan)
-        values[~outside] = self(where[~outside])
-        return values
+    @property
+    def patches(self) -> "tuple[SplineField, ...]":
+        """Return the field itself, that of the only patch."""
+        return (self,)
 
     def grid(self, u: ArrayLike, v: ArrayLike, w: ArrayLike) -> Array:
         """Return the values (len(u), len(v), len(w)) or (.., c) on a tensor grid of parameters."""
@@ -145,16 +177,6 @@ class SplineField(Brief):
         values = values.transpose(0, *(1 + axis for axis in (*x.order, *single))).reshape(-1, *x.shape[1:])
         return values if self.coefficients.ndim == 4 else values[0]
 
-    def fits(self, body: BodyLike) -> bool:
-        """Return whether the field may be a datum on a body: its own volume is the body, or it has none."""
-        own, volume = self.geometry, body
-        if isinstance(volume, Body):
-            return False
-        if own is None or own is volume:
-            return True
-        parts = zip((*own.knots, own.homogeneous), (*volume.knots, volume.homogeneous), strict=True)
-        return own.degrees == volume.degrees and all(np.array_equal(*pair) for pair in parts)
-
     def save(self, path: str | Path) -> None:
         """Write solution.npz (degrees, knots_u, knots_v, knots_w, coefficients) atomically."""
         save_spline(path, self.degrees, self.knots, coefficients=self.coefficients)
@@ -166,22 +188,22 @@ class SplineField(Brief):
         Raises FileNotFoundError, or a ValueError that names the defect of the file.
         """
         degrees, knots, coefficients = load_spline(path, "coefficients")
-        if coefficients.dtype.kind != "f" or not np.all(np.isfinite(coefficients)):
-            raise ValueError(f"{path}: coefficients must be finite numbers")
-        try:
-            return SplineField(degrees, knots, coefficients)
-        except (TypeError, ValueError) as error:
-            raise ValueError(f"{path}: {error}") from None
+        return _checked(str(path), np.array(degrees), knots, coefficients)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class MultiPatchField(Brief):
-    """Evaluate a function on several patches.
+class BodyField(Brief, FieldOnBody):
+    """Evaluate a function on a body of one patch or several.
+
+    On one patch it has the parts of its SplineField: `degrees`, `knots`, `coefficients`, `geometry`, values at
+    parameters and `grid`. On several it raises ValueError for them.
 
     Parameters
     ----------
     patches : tuple of SplineField
         The function on each patch, with the patch as its volume.
+    body : Body, optional
+        The body that these patches make.
 
     Examples
     --------
@@ -194,62 +216,109 @@ class MultiPatchField(Brief):
     """
 
     patches: tuple[SplineField, ...]
+    body: Body | None = field(default=None, repr=False)
+
+    @property
+    def on_body(self) -> Body:
+        """Return the body of the function. Raises ValueError where it is unknown."""
+        return super().on_body if self.body is None else self.body
+
+    @property
+    def is_single(self) -> bool:
+        """Return whether the function is that of one patch which is not glued to itself."""
+        return len(self.patches) == 1 and (self.body is None or self.body.is_single)
+
+    @property
+    def only(self) -> SplineField:
+        """Return the function on the patch of a body of one. Raises ValueError for several."""
+        if len(self.patches) > 1:
+            raise ValueError(f"this field has {len(self.patches)} patches: use field.patches[i], or probe")
+        return self.patches[0]
+
+    @property
+    def degrees(self) -> tuple[int, int, int]:
+        """Return the degrees of the three directions, of one patch."""
+        return self.only.degrees
+
+    @property
+    def knots(self) -> Knots:
+        """Return the three knot vectors, of one patch."""
+        return self.only.knots
+
+    @property
+    def coefficients(self) -> Array:
+        """Return the coefficients (m_u, m_v, m_w) or (m_u, m_v, m_w, c), of one patch."""
+        return self.only.coefficients
+
+    @property
+    def geometry(self) -> BodyLike | None:
+        """Return the volume, or the body of several patches; None where it is unknown."""
+        return self.only.geometry if self.body is None else self.body.simplest
+
+    def __call__(self, points: ArrayLike) -> Array:
+        """Return the values (m,) or (m, c) at parameters (m, 3) of one patch."""
+        return self.only(points)
+
+    def grid(self, u: ArrayLike, v: ArrayLike, w: ArrayLike) -> Array:
+        """Return the values (len(u), len(v), len(w)) or (.., c) on a tensor grid of parameters of one patch."""
+        return self.only.grid(u, v, w)
+
+    def at(self, x: Array) -> Array:
+        """Return the values (...) or (c, ...) at points x (3, ...) of the solver, which belong to one patch."""
+        return self.only.at(x)
+
+    def arrays(self, coefficients: Sequence[Array] = ()) -> dict[str, Array]:
+        """Return the arrays of solution.npz by their names: degrees, .., of several patches p0_degrees, ..
+
+        coefficients: those of each patch, by default its own.
+        """
+        found: dict[str, Array] = {}
+        for number, (patch, values) in enumerate(zip(self.patches, coefficients or self._coefficients, strict=True)):
+            parts = (np.array(patch.degrees), *patch.knots, values)
+            prefix = "" if self.is_single else f"p{number}_"
+            found |= {prefix + name: array for name, array in zip(ARRAYS, parts, strict=True)}
+        return found
+
+    @property
+    def _coefficients(self) -> list[Array]:
+        return [patch.coefficients for patch in self.patches]
 
     def save(self, path: str | Path) -> None:
-        """Write solution.npz of several patches (p0_degrees, .., p0_coefficients, p1_degrees, ..) atomically."""
-        save_arrays(path, **arrays_of(self.patches, [patch.coefficients for patch in self.patches]))
+        """Write solution.npz (degrees, .., coefficients; of several patches p0_degrees, ..) atomically."""
+        save_arrays(path, **self.arrays())
 
     @staticmethod
-    def load(path: str | Path) -> "MultiPatchField":
-        """Read the field of a solution.npz of several patches, without its maps and report.
+    def load(path: str | Path) -> "BodyField":
+        """Read the field of a solution.npz of one patch or several, without its maps and report.
 
         Raises FileNotFoundError, or a ValueError that names the defect of the file.
         """
         count = sum(name.endswith("_degrees") for name in array_names(path))
         if count == 0:
-            raise ValueError(f"{path}: holds no solution on several patches")
+            return BodyField((SplineField.load(path),))
         arrays = load_arrays(path, tuple(f"p{number}_{name}" for number in range(count) for name in ARRAYS))
         patches = []
         for number in range(count):
             degrees, *knots, coefficients = (arrays[f"p{number}_{name}"] for name in ARRAYS)
-            if coefficients.dtype.kind != "f" or not np.all(np.isfinite(coefficients)):
-                raise ValueError(f"{path}: patch {number}: coefficients must be finite numbers")
-            try:
-                p_u, p_v, p_w = degrees.tolist()
-                patches.append(SplineField((p_u, p_v, p_w), (knots[0], knots[1], knots[2]), coefficients))
-            except (TypeError, ValueError) as error:
-                raise ValueError(f"{path}: patch {number}: {error}") from None
-        return MultiPatchField(tuple(patches))
-
-    def probe(self, points: ArrayLike) -> Array:
-        """Return the values (m,) or (m, c) at points (m, 3) in space, in the body's units; NaN outside of the body.
-
-        Raises ValueError for points that are not finite or of another shape.
-        """
-        found = self.patches[0].probe(points)
-        for patch in self.patches[1:]:
-            missing = np.isnan(found.reshape(len(found), -1)).any(axis=1)
-            if missing.any():
-                found[missing] = patch.probe(np.atleast_2d(np.asarray(points, dtype=np.float64))[missing])
-        return found
-
-    def at(self, x: Array) -> Array:
-        """Raise ValueError: points of the solver have the values of the field of their patch."""
-        raise ValueError("a field on several patches has values at points of a patch: use its `patches`, or probe")
-
-    def fits(self, body: BodyLike) -> bool:
-        """Return whether the field may be a datum on a body: its own patches are those of the body."""
-        return (
-            isinstance(body, Body)
-            and len(body) == len(self.patches)
-            and all(field.fits(volume) for field, volume in zip(self.patches, body.patches, strict=True))
-        )
+            patches.append(_checked(f"{path}: patch {number}", degrees, knots, coefficients))
+        return BodyField(tuple(patches))
 
 
-def arrays_of(patches: Sequence[SplineField], coefficients: Sequence[Array]) -> dict[str, Array]:
-    """Return the arrays of an .npz of several patches by their names, such as p0_degrees and p0_coefficients."""
-    found: dict[str, Array] = {}
-    for number, (patch, values) in enumerate(zip(patches, coefficients, strict=True)):
-        parts = (np.array(patch.degrees), *patch.knots, values)
-        found |= {f"p{number}_{name}": array for name, array in zip(ARRAYS, parts, strict=True)}
-    return found
+def _checked(place: str, degrees: Array, knots: Sequence[Array], coefficients: Array) -> SplineField:
+    """Return the field of a file. Raises ValueError, which begins with the place in the file."""
+    if coefficients.dtype.kind != "f" or not np.all(np.isfinite(coefficients)):
+        raise ValueError(f"{place}: coefficients must be finite numbers")
+    try:
+        (p_u, p_v, p_w), (k_u, k_v, k_w) = degrees.tolist(), knots
+        return SplineField((p_u, p_v, p_w), (k_u, k_v, k_w), coefficients)
+    except (TypeError, ValueError) as error:
+        raise ValueError(f"{place}: {error}") from None
+
+
+def _is_on(field: SplineField, volume: BSplineVolume) -> bool:
+    """Return whether a field belongs to a volume, or to none."""
+    own = field.geometry
+    if own is None or own is volume:
+        return True
+    parts = zip((*own.knots, own.homogeneous), (*volume.knots, volume.homogeneous), strict=True)
+    return own.degrees == volume.degrees and all(np.array_equal(*pair) for pair in parts)

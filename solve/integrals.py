@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from parameterize.arrays import Array, IntArray
-from parameterize.spline.body import Body, BodyLike, as_body
+from parameterize.spline.body import Body, as_body
 from parameterize.spline.bspline import breakpoints, gauss_points
-from parameterize.spline.interface import axis_side, face_label
+from parameterize.spline.interface import axis_side
 from parameterize.spline.orientation import exact_points
 from parameterize.spline.volume import BSplineVolume
 
@@ -19,11 +19,11 @@ from .forms.form import Quantity
 from .forms.frame import UnitFrame
 from .forms.region import Region, Regions, regions_of
 from .quantities import at_points, grid_values, quantity_of, slabs
-from .solution import MultiPatchSolution, Solution
+from .solution import PatchSolution, Solution
 
 Integrand = Quantity | Callable[[Points], ArrayLike]
-Patch = BSplineVolume | Solution
-Domain = Patch | Body | MultiPatchSolution
+Patch = BSplineVolume | PatchSolution
+Domain = Patch | Body | Solution
 
 
 def integrate(
@@ -35,7 +35,7 @@ def integrate(
 
     Parameters
     ----------
-    body : BSplineVolume, Body, Solution or MultiPatchSolution
+    body : BSplineVolume, Body or Solution
         The domain of the integral.
     what : str or function, optional
         The integrand; by default 1, so that the integral is the volume or the area. For a solution the name of a
@@ -73,7 +73,7 @@ def integrate(
     return np.asarray(total)
 
 
-def resultant(solution: Solution | MultiPatchSolution, over: Regions) -> Array:
+def resultant(solution: Solution, over: Regions) -> Array:
     """Return the integral of a law's flux through regions, outward (c,): of elasticity the force that acts on the body.
 
     The flux is a derivative of the solution, so its integral is less accurate than a solution's values. The reactions
@@ -81,7 +81,7 @@ def resultant(solution: Solution | MultiPatchSolution, over: Regions) -> Array:
 
     Parameters
     ----------
-    solution : Solution or MultiPatchSolution
+    solution : Solution
         Solution of any law.
     over : Region, str or list of these
         Regions of the boundary, as in `integrate`.
@@ -100,11 +100,11 @@ def resultant(solution: Solution | MultiPatchSolution, over: Regions) -> Array:
     >>> bool(abs(iga_nn.resultant(solution, faces)[0]) < 1e-8)  # as much goes in as out
     True
     """
-    if not isinstance(solution, Solution | MultiPatchSolution):
+    if not isinstance(solution, Solution | PatchSolution):
         raise TypeError(f"a resultant is that of a solution, got {solution!r:.80}")
     total = np.zeros(solution.problem.form.components)
     for patch, rule in _surface_rules(solution, over):
-        assert isinstance(patch, Solution)
+        assert isinstance(patch, PatchSolution)
         flux = at_points(patch, patch.problem.form, "flux", rule.at.parameters)  # (m, c, 3)
         total += np.einsum("mcd,dm,m->c", flux, rule.at.normal, rule.weights)
     return total
@@ -112,12 +112,12 @@ def resultant(solution: Solution | MultiPatchSolution, over: Regions) -> Array:
 
 def _patches(body: Domain) -> Sequence[Patch]:
     """Return the patches of a body, or the solutions on them."""
-    return body.patches if isinstance(body, Body | MultiPatchSolution) else (body,)
+    return body.patches if isinstance(body, Body | Solution) else (body,)
 
 
-def _maps(body: Domain) -> BodyLike:
+def _maps(body: Domain) -> Body:
     """Return the maps of a body or of a solution."""
-    return body if isinstance(body, BodyLike) else body.geometry
+    return body.on_body if isinstance(body, Solution | PatchSolution) else as_body(body)
 
 
 def _volume_of(body: Patch) -> BSplineVolume:
@@ -151,13 +151,13 @@ def _surface_rules(body: Domain, over: Regions) -> Iterator[tuple[Patch, Surface
 
     Each rule comes with its patch. Raises ValueError where that part is empty.
     """
-    regions, glued, found = _placed(body, over), as_body(_maps(body)), False
+    regions, glued, found = _placed(body, over), _maps(body), False
     for number, (patch, names) in enumerate(zip(_patches(body), glued.outer, strict=True)):
         degree = max(_counts(patch)) - 1  # a rule has a point more
         rows = [same_smoothness(knots, old, degree) for knots, old in zip(patch.knots, patch.degrees, strict=True)]
         space = TrialSpace((degree, degree, degree), (rows[0], rows[1], rows[2]))
         for face in names:
-            name = face_label(number, face) if isinstance(_maps(body), Body) else face
+            name = glued.face_name(number, face)
 
             def codes(x: Array, normal: Array, name: str = name) -> IntArray:
                 return np.any([region.holds(x, normal, name) for region in regions], axis=0).astype(np.int64)
@@ -178,21 +178,21 @@ def _placed(body: Domain, over: Regions) -> list[Region]:
         raise ValueError(f"over: give regions, such as 'nz > 0.9' or 'u0', got {over!r:.80}")
     regions = regions_of(over)
     frame = UnitFrame.of(_maps(body)) if any(region.is_scaled for region in regions) else None
-    conditions = body.problem.conditions if isinstance(body, Solution | MultiPatchSolution) else ()
+    conditions = body.problem.conditions if isinstance(body, Solution | PatchSolution) else ()
     surface = next((c.region.surface for c in conditions if c.region.surface is not None), None)
     return [region.placed(frame, surface) for region in regions]
 
 
 def _on_grid(body: Patch, what: str | Integrand | None, u: Array, v: Array, w: Array) -> Array:
     """Return the values (..., n_u, n_v, n_w) of the integrand on a grid of parameters."""
-    if what is not None and isinstance(body, Solution):
+    if what is not None and isinstance(body, PatchSolution):
         return grid_values(body, quantity_of(body.problem.form, what), u, v, w)  # type: ignore[arg-type]
     return _of_position(what, Points.on(_volume_of(body), u, v, w))
 
 
 def _at_points(body: Patch, what: str | Integrand | None, rule: SurfaceRule) -> Array:
     """Return the values (m, ...) of the integrand at the points of a rule."""
-    if what is not None and isinstance(body, Solution):
+    if what is not None and isinstance(body, PatchSolution):
         return at_points(body, body.problem.form, what, rule.at.parameters)  # type: ignore[arg-type]
     x = Points.at(np.ascontiguousarray(rule.at.x), rule.at.parameters)
     return np.moveaxis(_of_position(what, x), -1, 0)

@@ -1,7 +1,7 @@
 """Marches through time with M u' + A u = f(t): BDF2 and the trapezoidal rule, step after step."""
 
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from numbers import Integral, Real
@@ -13,16 +13,15 @@ import numpy as np
 from parameterize.arrays import Array
 from parameterize.conjugate_gradients import LinearResult, conjugate_gradients
 from parameterize.display import Brief, above
-from parameterize.spline.volume import BSplineVolume, demand_volume
+from parameterize.spline.body import Body, BodyLike, as_body
 from parameterize.threads import one_blas_thread
 
 from .assembly import assemble_data
 from .diagnostics import ConvergenceError
-from .discretization.operator import MatrixFree, Operator, assemble
+from .discretization.operator import Operator, assemble
 from .discretization.projection import projected
-from .discretization.quadrature import GaussRule
-from .discretization.space import TrialSpace, embedded
-from .field import SplineField
+from .discretization.unknowns import Unknowns, unknowns_of
+from .field import BodyField, FieldOnBody
 from .forms.boundary_value_problem import BoundaryValueProblem
 from .forms.data import Data, parse
 from .forms.frame import UnitFrame
@@ -31,7 +30,7 @@ from .linear.krylov import generalized_residuals
 from .options import IterationOptions, SolveOptions
 from .patch_system import PatchProblem
 from .solver import prepared
-from .system import System, build
+from .system import System, build, coefficients_in, field_of
 
 SCHEMES = ("bdf2", "trapezoidal")
 EULER = 1.0  # the factors of capacity / dt that a step adds to the matrix
@@ -48,7 +47,7 @@ class March(Brief):
     ----------
     times : (k,) array
         The times of the fields; the first is the time of the start.
-    fields : tuple of k SplineField
+    fields : tuple of k BodyField
         The solution at these times.
     iterations : (steps,) array
         Number of iterations of the linear solver in each step.
@@ -64,7 +63,7 @@ class March(Brief):
     """
 
     times: Array
-    fields: tuple[SplineField, ...]
+    fields: tuple[BodyField, ...]
     iterations: Array
 
     def save_pvd(self, path: str | Path, samples: int | None = None) -> None:
@@ -76,9 +75,9 @@ class March(Brief):
 
 
 def march(
-    volume: BSplineVolume,
+    body: BodyLike,
     problem: BoundaryValueProblem | Callable[[float], BoundaryValueProblem],
-    start: SplineField | Data,
+    start: FieldOnBody | Data,
     *,
     dt: float,
     steps: int,
@@ -86,7 +85,7 @@ def march(
     capacity: float = 1.0,
     first: float = 0.0,
     every: int = 1,
-    callback: Callable[[float, SplineField], object] | None = None,
+    callback: Callable[[float, BodyField], object] | None = None,
     refine: int = 0,
     degree: int | None = None,
     threads: int | None = None,
@@ -101,12 +100,12 @@ def march(
 
     Parameters
     ----------
-    volume : BSplineVolume
-        The map.
+    body : BSplineVolume or Body
+        The map, or the maps.
     problem : Poisson, Elasticity, Problem, or a function of the time that returns one
         A function changes the data from step to step: `lambda t: iga_nn.Poisson(source=f"{t}*x", boundary="0")`. The
         law stays that of the first time, and so do the faces where u is given.
-    start : SplineField or datum
+    start : SplineField, BodyField or datum
         u at the first time: a field of the trial space or of a coarser space, or a datum: a formula, a function or a
         sequence.
     dt : float
@@ -156,10 +155,10 @@ def march(
         max_iterations=max_iterations,
     )
     at = problem if callable(problem) else lambda _: problem
-    demand_volume(volume)
-    _, (patch,) = prepared(volume, at(first), options)
+    glued = as_body(body)
+    placed, patches = prepared(glued, at(first), options)
     with one_blas_thread():
-        data = _Data(patch, at, options, callable(problem))
+        data = _Data(glued, placed, patches, at, options, callable(problem))
         path = _Path(data, scheme, capacity / dt, _started(data, start, first), first)
         times, fields, iterations = [first], [path.field], []
         for number in range(1, steps + 1):
@@ -186,132 +185,145 @@ def _check(dt: float, steps: int, scheme: str, capacity: float, every: int) -> N
 
 @dataclass(frozen=True, eq=False)
 class _Data:
-    """Evaluate a problem at any time, on one trial space.
+    """Evaluate a problem at any time, on one trial space. Coefficients are a list, (c, n_u, n_v, n_w) of each patch.
 
-    patch: the problem of the first time, placed in the volume.
+    placed, patches: the problem of the first time, placed in the body, and on each patch.
     """
 
-    patch: PatchProblem
+    body: Body
+    placed: BoundaryValueProblem
+    patches: list[PatchProblem]
     problem_at: Callable[[float], Any]
     options: SolveOptions
     varies: bool
 
-    @property
-    def volume(self) -> BSplineVolume:
-        """Return the volume."""
-        return self.patch.volume
+    @cached_property
+    def unknowns(self) -> Unknowns:
+        """Return the unknowns of all patches."""
+        return unknowns_of([patch.space for patch in self.patches], self.body.interfaces)
 
-    @property
-    def placed(self) -> BoundaryValueProblem:
-        """Return the problem of the first time, placed in the volume."""
-        return self.patch.problem
-
-    @property
-    def space(self) -> TrialSpace:
-        """Return the trial space."""
-        return self.patch.space
-
-    def at(self, time: float) -> tuple[Array, Array]:
-        """Return the load and the coefficients given on faces, (c, n_u, n_v, n_w) each.
+    def at(self, time: float) -> tuple[list[Array], list[Array]]:
+        """Return the loads and the coefficients given on faces.
 
         Raises ValueError where the faces with given coefficients are others than at the first time.
         """
         return self._found(self.problem_at(time), time) if self.varies else self._constant
 
     @cached_property
-    def _constant(self) -> tuple[Array, Array]:
+    def _constant(self) -> tuple[list[Array], list[Array]]:
         return self._found(self.placed, 0.0)
 
-    def _found(self, problem: BoundaryValueProblem, time: float) -> tuple[Array, Array]:
+    def _found(self, problem: BoundaryValueProblem, time: float) -> tuple[list[Array], list[Array]]:
         if problem.places != self.placed.places:
             raise ValueError(f"the problem of time {time:g} has data on other faces than that of the first time")
-        given = problem.on(self.volume)
-        _, load, known = assemble_data(self.volume, given, self.space, self.options)
-        return load, known
+        loads, known = [], []
+        for patch, given in zip(self.patches, problem.on(self.body).on_patches(self.body), strict=True):
+            _, load, fixed = assemble_data(patch.volume, given, patch.space, self.options)
+            loads.append(load)
+            known.append(fixed)
+        return loads, self.unknowns.completed(known)
+
+    def filled(self, free: Array, known: Sequence[Array]) -> list[Array]:
+        """Return all coefficients from the unknowns (c, ...) and the coefficients given on faces."""
+        return [full + given for full, given in zip(self.unknowns.spread(free), known, strict=True)]
 
     def system(self, shift: float) -> System:
         """Return the system of the law plus `shift` times the mass."""
-        return build(self.volume, self.placed, [self.patch], self.options, shift)
+        return build(self.body, self.placed, self.patches, self.options, shift)
 
-    def mass(self, rule: GaussRule) -> Operator:
-        """Return the mass matrix of all coefficients, by the quadrature rule of a system.
+    def masses(self, system: System) -> list[Operator]:
+        """Return the mass matrix of all coefficients of each patch, by the quadrature rules of a system.
 
         The mass by another rule would act as a source.
         """
-        found, _ = assemble(self.volume, self.space, Mass(), rule=rule, threads=self.options.thread_count)
-        assert isinstance(found, Operator)
+        found = []
+        for patch in system.patches:
+            how: dict[str, Any] = {"rule": patch.matrix.rule, "threads": self.options.thread_count}
+            mass, _ = assemble(patch.volume, patch.space, Mass(), **how)
+            assert isinstance(mass, Operator)
+            found.append(mass)
         return found
 
 
-def _started(data: _Data, start: SplineField | Data, time: float) -> Array:
-    """Return the coefficients (c, n_u, n_v, n_w) of the start; coefficients on faces follow from the data at `time`."""
-    space, components = data.space, data.placed.form.components
-    if isinstance(start, SplineField):
-        full = embedded(start.coefficients, start.degrees, start.knots, space)
-        full = np.array(full[None] if full.ndim == 3 else np.moveaxis(full, -1, 0))
-        if len(full) != components:
-            raise ValueError(f"start has {len(full)} components, the law {components}")
+def _started(data: _Data, start: FieldOnBody | Data, time: float) -> list[Array]:
+    """Return the coefficients of the start; those on faces follow from the data at `time`.
+
+    A datum is projected on each patch: at an interface the mean of the patches' coefficients is taken.
+    """
+    components = data.placed.form.components
+    if isinstance(start, FieldOnBody):
+        full = coefficients_in(start, data.patches)
+        if len(full[0]) != components:
+            raise ValueError(f"start has {len(full[0])} components, the law {components}")
     else:
         datum = parse("start", start, components, of_coordinates=data.placed.of_coordinates)
-        full = projected(data.volume, space, datum.placed(UnitFrame.of(data.volume)))
-    _, known = data.at(time)
-    inside = full[:, *space.window].copy()
-    full = known.copy()
-    full[:, *space.window] = inside
-    return full
+        placed = datum.placed(UnitFrame.of(data.body))
+        own = [placed] if data.body.is_single else map(placed.on_patch, range(len(data.body)))
+        parts = zip(data.patches, own, strict=True)
+        full = [projected(patch.volume, patch.space, values) for patch, values in parts]
+    copies = data.unknowns.collect([np.ones(part.shape) for part in full])
+    return data.filled(data.unknowns.collect(full) / copies, data.at(time)[1])
 
 
 class _Path:
-    """Hold the state of a march: the time, and the last and earlier coefficients, (c, n_u, n_v, n_w) each."""
+    """Hold the state of a march: the time, and the last and earlier coefficients of all patches."""
 
-    def __init__(self, data: _Data, scheme: str, rate: float, start: Array, time: float) -> None:
+    def __init__(self, data: _Data, scheme: str, rate: float, start: list[Array], time: float) -> None:
         """Begin a march at a time; rate: the capacity over dt."""
         self.data, self.scheme, self.rate = data, scheme, rate
         self.time, self.last, self.load = time, start, data.at(time)[0]
-        self.before: Array | None = None
+        self.before: list[Array] | None = None
         self.system = data.system(FACTORS[scheme] * rate)
-        self.mass = data.mass(self.matrix.rule)
+        self.masses = data.masses(self.system)
 
     @property
-    def matrix(self) -> MatrixFree:
-        """Return the matrix of the system that most steps solve."""
-        return self.system.patches[0].matrix
-
-    @property
-    def field(self) -> SplineField:
-        """Return the spline of the last coefficients."""
-        space = self.data.space
-        coefficients = self.last[0] if len(self.last) == 1 else np.moveaxis(self.last, 0, -1)
-        return SplineField(space.degrees, space.knots, coefficients, self.data.volume)
+    def field(self) -> BodyField:
+        """Return the field of the last coefficients."""
+        return field_of(self.data.body, self.data.patches, self.last)
 
     def step(self, time: float) -> int:
         """March to a time, and return the number of iterations. Raises ConvergenceError."""
-        load, known = self.data.at(time)
-        system, right = self._equation(load)
-        window = (slice(None), *self.data.space.window)
-        right = np.ascontiguousarray((right - system.patches[0].matrix.apply(known))[window])
-        guess = self.last if self.before is None else 2.0 * self.last - self.before
-        found = _solved(system, right, np.ascontiguousarray(guess[window]), self.data.options)
+        loads, known = self.data.at(time)
+        system, right = self._equation(loads)
+        unknowns = self.data.unknowns
+        parts = zip(right, system.patches, known, strict=True)
+        free = unknowns.collect([own - patch.matrix.apply(given) for own, patch, given in parts])
+        found = _solved(system, free, unknowns.chosen(self._guess), self.data.options)
         if not found.converged:
             raise ConvergenceError(
                 f"march: no convergence at time {time:g}, residual {found.residuals[-1]:.1e} after {found.iterations} "
                 "iterations: raise max_iterations or the tolerance"
             )
-        new = known.copy()
-        new[window] = found.x
-        self.time, self.before, self.last, self.load = time, self.last, new, load
+        self.time, self.before, self.last, self.load = time, self.last, self.data.filled(found.x, known), loads
         log.info("time %g: %d iterations", time, found.iterations)
         return found.iterations
 
-    def _equation(self, load: Array) -> tuple[System, Array]:
-        """Return the system of a step and its right-hand side, (c, n_u, n_v, n_w)."""
-        mass = self.mass.apply
-        if self.scheme == "trapezoidal":  # (A + s M) new = f_new + f + (s M - A) last, s = 2 / dt
-            shifted = self.matrix.apply(self.last)
-            return self.system, load + self.load + 2.0 * FACTORS[self.scheme] * self.rate * mass(self.last) - shifted
+    @property
+    def _guess(self) -> list[Array]:
+        """Return the coefficients on the line through the earlier and the last ones."""
         if self.before is None:
-            return self.data.system(EULER * self.rate), load + EULER * self.rate * mass(self.last)
-        return self.system, load + 0.5 * self.rate * mass(4.0 * self.last - self.before)
+            return self.last
+        return [2.0 * last - before for last, before in zip(self.last, self.before, strict=True)]
+
+    def _equation(self, loads: Sequence[Array]) -> tuple[System, list[Array]]:
+        """Return the system of a step and its right-hand side on each patch."""
+        numbers = range(len(loads))
+        if self.scheme == "trapezoidal":
+            return self.system, [self._trapezoidal(k, loads[k]) for k in numbers]
+        if self.before is None:
+            rate, parts = EULER * self.rate, zip(loads, self.masses, self.last, strict=True)
+            return self.data.system(rate), [load + rate * mass.apply(last) for load, mass, last in parts]
+        return self.system, [self._backward(k, loads[k], self.before[k]) for k in numbers]
+
+    def _trapezoidal(self, k: int, load: Array) -> Array:
+        """Return f_new + f + (s M - A) last on patch k, s = 2 / dt: that of (A + s M) new."""
+        last = self.last[k]
+        shifted = self.system.patches[k].matrix.apply(last)
+        return load + self.load[k] + 2.0 * FACTORS[self.scheme] * self.rate * self.masses[k].apply(last) - shifted
+
+    def _backward(self, k: int, load: Array, before: Array) -> Array:
+        """Return the right-hand side of BDF2 on patch k."""
+        return load + 0.5 * self.rate * self.masses[k].apply(4.0 * self.last[k] - before)
 
 
 def _solved(system: System, right: Array, guess: Array, options: IterationOptions) -> LinearResult:

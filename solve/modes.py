@@ -16,7 +16,7 @@ from parameterize.spline.body import BodyLike
 from parameterize.threads import one_blas_thread
 
 from .diagnostics import ConvergenceError, bending_notices
-from .field import MultiPatchField, arrays_of
+from .field import BodyField
 from .forms.boundary_value_problem import BoundaryValueProblem
 from .linear.direct import factorized, price_of, sparse
 from .linear.inverse import RoughInverse
@@ -40,7 +40,7 @@ class Modes(Brief):
     ----------
     frequencies : (n,) array
         omega / (2 pi) for K phi = omega^2 M phi: in Hz where the units are consistent and time is in seconds.
-    shapes : tuple of n SplineField, of several patches MultiPatchField
+    shapes : tuple of n BodyField
         phi with unit mass: the integral of density phi . phi is 1. The largest coefficient is positive.
     residuals : (n,) array
         Residuals `|K phi - omega^2 M phi| / |K phi|` of the free coefficients, in the norm of K^-1 where the system
@@ -64,7 +64,7 @@ class Modes(Brief):
     """
 
     frequencies: Array
-    shapes: tuple[Any, ...]  # SplineField, or MultiPatchField
+    shapes: tuple[BodyField, ...]
     residuals: Array
     iterations: int
     rigid: int = 0
@@ -85,16 +85,9 @@ class Modes(Brief):
 
         Of several patches there are p0_degrees, .., p0_coefficients, p1_degrees, .. in their place.
         """
-        first = self.shapes[0]
-        if isinstance(first, MultiPatchField):
-            each = zip(*(shape.patches for shape in self.shapes), strict=True)
-            stacked = [np.stack([field.coefficients for field in fields]) for fields in each]
-            save_arrays(path, **arrays_of(first.patches, stacked), frequencies=self.frequencies)
-            return
-        rows = dict(zip(("knots_u", "knots_v", "knots_w"), first.knots, strict=True))
-        coefficients = np.stack([shape.coefficients for shape in self.shapes])
-        degrees = np.array(first.degrees)
-        save_arrays(path, degrees=degrees, **rows, coefficients=coefficients, frequencies=self.frequencies)
+        each = zip(*(shape.patches for shape in self.shapes), strict=True)
+        stacked = [np.stack([field.coefficients for field in fields]) for fields in each]
+        save_arrays(path, **self.shapes[0].arrays(stacked), frequencies=self.frequencies)
 
     def __str__(self) -> str:
         rows = [f"{i:4d} {frequency:10.4g}" for i, frequency in enumerate(self.frequencies, start=1)]

@@ -1,6 +1,7 @@
 """Solves laws that are not linear by Newton's method: exact derivatives by jets, a line search, load steps."""
 
 import logging
+from collections.abc import Sequence
 from dataclasses import dataclass
 from numbers import Integral
 from typing import Any
@@ -10,7 +11,7 @@ from numpy.typing import NDArray
 
 from parameterize.arrays import Array
 from parameterize.conjugate_gradients import INDEFINITE, conjugate_gradients
-from parameterize.spline.volume import BSplineVolume, demand_volume
+from parameterize.spline.body import Body, BodyLike, as_body
 from parameterize.threads import one_blas_thread
 
 from .assembly import assemble_data
@@ -18,18 +19,20 @@ from .diagnostics import ConvergenceError, judge
 from .discretization.errors import Part, error_norms
 from .discretization.nonlinear import Forces, Tangent
 from .discretization.on_regions import demand_area
-from .discretization.space import TrialSpace, embedded, longest_edge
+from .discretization.space import longest_edge
+from .discretization.unknowns import Unknowns, unknowns_of
 from .discretization.weak import WeakFace
-from .field import SplineField
+from .field import FieldOnBody
 from .forms.boundary_value_problem import BoundaryValueProblem
 from .forms.form import Form
 from .forms.problem import Problem
 from .linear.krylov import generalized_residuals
-from .linear.preconditioner import fast_diagonalization
+from .linear.preconditioner import blocks_of
 from .options import SolveOptions
-from .patch_system import PatchProblem
+from .patch_system import PatchProblem, scalar_operators
 from .solution import Solution, SolveReport
 from .solver import prepared
+from .system import coefficients_in, demand_fixed, field_of, preconditioners
 
 ENOUGH = 0.8  # share of the forces along a step that may be left at its end
 SHORTEST = 2.0**-12  # of a step
@@ -40,10 +43,10 @@ log = logging.getLogger(__name__)
 
 
 def newton(
-    volume: BSplineVolume,
+    body: BodyLike,
     problem: Problem,
     *,
-    start: SplineField | None = None,
+    start: FieldOnBody | None = None,
     load_steps: int = 1,
     refine: int = 0,
     degree: int | None = None,
@@ -60,11 +63,11 @@ def newton(
 
     Parameters
     ----------
-    volume : BSplineVolume
-        The map.
+    body : BSplineVolume or Body
+        The map, or the maps.
     problem : Problem
         The law and its data.
-    start : SplineField, optional
+    start : SplineField or BodyField, optional
         Start of the iteration, a field of the same degree in the trial space or a coarser space; zero by default.
     load_steps : int
         Number of equal steps in which source and data on faces grow to their values; each starts at the last solution.
@@ -114,111 +117,164 @@ def newton(
         raise ValueError(f"load_steps must be a whole number, at least 1, got {load_steps!r:.80}")
     if weak := [c.role for c in problem.conditions if c.is_essential and not c.is_strong]:
         raise ValueError(f"{weak[0]}: newton holds all of u on whole faces of the cube only: write a region such as u0")
-    demand_volume(volume)
-    placed, (patch,) = prepared(volume, problem, options)
-    space = patch.space
+    glued = as_body(body)
+    placed, patches = prepared(glued, problem, options)
     if placed.fixes_nothing and not placed.form.has_reaction:
         raise ValueError(
             "newton: fluxes alone do not determine the solution: give a value, or an exchange, on a face or a region"
         )
     with one_blas_thread():
-        balance = _Balance.of(volume, placed, space, options, linear_iterations)
-        full = np.zeros_like(balance.load)
+        balance = _Balance.of(glued, placed, patches, options, linear_iterations)
+        full = [np.zeros_like(load) for load in balance.loads]
         if start is not None:
-            full = embedded(start.coefficients, start.degrees, start.knots, space)
-            full = np.array(full[None] if full.ndim == 3 else np.moveaxis(full, -1, 0))
+            full = coefficients_in(start, patches)
         history: list[float] = []
         for step in range(1, load_steps + 1):
             full = balance.found(full, step / load_steps, history)
-        return _solution(patch, full, balance, history, load_steps)
+        return _solution(glued, placed, patches, full, balance, history, load_steps)
 
 
 @dataclass(frozen=True, eq=False)
 class _Balance:
-    """Compare the forces of a law with the loads; arrays are (c, n_u, n_v, n_w).
+    """Compare the forces of a law with the loads; coefficients are a list, (c, n_u, n_v, n_w) of each patch.
 
-    known: the coefficients that are given on faces. is_fixed: the mask of these coefficients.
+    known: the coefficients that are given on faces. fixed: the masks of these coefficients.
     """
 
-    forces: Forces
-    load: Array
-    known: Array
-    is_fixed: NDArray[np.bool_]
+    body: Body
+    unknowns: Unknowns
+    forces: list[Forces]
+    loads: list[Array]
+    known: list[Array]
+    fixed: list[NDArray[np.bool_]]
     options: SolveOptions
     linear_iterations: int
 
     @classmethod
     def of(
-        cls, volume: BSplineVolume, problem: Any, space: TrialSpace, options: SolveOptions, linear_iterations: int
+        cls, body: Body, problem: Any, patches: Sequence[PatchProblem], options: SolveOptions, linear_iterations: int
     ) -> "_Balance":
         """Return the balance of a problem. Raises ValueError where a region has no area that is free of values.
 
         linear_iterations: the largest number of iterations of the linear solver in a Newton step.
         """
-        operator, load, known = assemble_data(volume, _Loads(problem), space, options)  # type: ignore[arg-type]
-        on_regions = [face for face in operator.faces.values() if isinstance(face, WeakFace)]
-        demand_area(problem, on_regions, space, [volume])
-        is_fixed = np.ones(load.shape, dtype=bool)
-        is_fixed[:, *space.window] = False
-        return cls(Forces.of(operator, volume, problem.form), load, known, is_fixed, options, linear_iterations)
+        forces, loads, known, operators, on_regions = [], [], [], [], list[WeakFace]()
+        for patch in patches:
+            simple: Any = _Loads(patch.problem)
+            operator, load, given = assemble_data(patch.volume, simple, patch.space, options)
+            forces.append(Forces.of(operator, patch.volume, patch.problem.form))
+            operators.append(scalar_operators(operator, len(load)))
+            loads.append(load)
+            known.append(given)
+            on_regions += [face for face in operator.faces.values() if isinstance(face, WeakFace)]
+        demand_area(problem, on_regions, patches[0].space, body.patches)
+        for part in body.parts if len(body.parts) > 1 and not problem.form.has_reaction else ():
+            demand_fixed(part, [block for number in part for block in blocks_of(operators[number])])
+        unknowns = unknowns_of([patch.space for patch in patches], body.interfaces)
+        free = unknowns.spread(np.ones((len(loads[0]), *unknowns.shape)))
+        known, fixed = unknowns.completed(known), [part == 0.0 for part in free]
+        return cls(body, unknowns, forces, loads, known, fixed, options, linear_iterations)
 
-    def found(self, full: Array, share: float, history: list[float]) -> Array:
+    def found(self, full: list[Array], share: float, history: list[float]) -> list[Array]:
         """Return the coefficients for which the forces balance a share of the loads, starting from `full`.
 
         The residuals are appended to the history. Raises ConvergenceError.
         """
-        load, made = share * self.load, 0
-        inner = self.forces.apply(full)
-        if not np.isfinite(inner).all():
+        loads, made = [share * load for load in self.loads], 0
+        inner = self._inner(full)
+        if not all(np.isfinite(part).all() for part in inner):
             raise ConvergenceError("newton: the law gives no finite forces at the start; give another one in start")
         while True:
-            missing = np.where(self.is_fixed, share * self.known - full, 0.0)
-            rest = inner - load
-            size = float(np.linalg.norm(inner) + np.linalg.norm(load))
-            history.append(float(np.linalg.norm(rest[~self.is_fixed])) / size if size else 0.0)
+            parts = zip(self.fixed, self.known, full, strict=True)
+            missing = [np.where(fixed, share * known - own, 0.0) for fixed, known, own in parts]
+            rest = _less(inner, loads)
+            size = sum(float(np.linalg.norm(self.unknowns.assembled(forces))) for forces in (inner, loads))
+            history.append(float(np.linalg.norm(self.unknowns.collect(rest))) / size if size else 0.0)
             log.info("share %.3g of the loads, step %d: residual %.1e", share, made, history[-1])
-            is_reached = np.abs(missing).max() <= REACHED * np.abs(self.known).max(initial=0.0)
+            is_reached = _largest(missing) <= REACHED * _largest(self.known)
             if history[-1] <= self.options.tolerance and is_reached:
                 return full
             if made == self.options.max_iterations:
                 raise ConvergenceError(_failed(history, f"after {made} iterations"))
             step = self._step(full, rest, missing, history[-1])
-            searched = self._searched(full, step, inner, load, bool(is_reached))
+            searched = self._searched(full, step, inner, loads, is_reached)
             if searched is None:
                 raise ConvergenceError(_failed(history, "and no step lowers it"))
             (full, inner), made = searched, made + 1
 
-    def _step(self, full: Array, rest: Array, missing: Array, residual: float) -> Array:
+    def _inner(self, full: Sequence[Array]) -> list[Array]:
+        """Return the forces of the law on each patch."""
+        return [forces.apply(own) for forces, own in zip(self.forces, full, strict=True)]
+
+    def _step(
+        self, full: Sequence[Array], rest: Sequence[Array], missing: Sequence[Array], residual: float
+    ) -> list[Array]:
         """Return Newton's step, after which the coefficients on faces have their given values."""
-        tangent, form = self.forces.derivative(full), self.forces.form
-        if form.symmetric and not tangent.is_symmetric:
+        tangents = [forces.derivative(own) for forces, own in zip(self.forces, full, strict=True)]
+        form = self.forces[0].form
+        if form.symmetric and not all(tangent.is_symmetric for tangent in tangents):
             raise ValueError(f"{type(form).__name__} has a derivative that is not symmetric: set `symmetric = False`")
-        window = (slice(None), *tangent.space.window)
-        right = -np.ascontiguousarray((rest + tangent.apply(missing))[window])
-        step = missing.copy()
-        step[window] = _solved(tangent, right, form.symmetric, float(np.clip(residual, *INNER)), self.linear_iterations)
-        return step
+        parts = zip(rest, tangents, missing, strict=True)
+        right = -self.unknowns.collect([own + tangent.apply(given) for own, tangent, given in parts])
+        free = self._solved(tangents, right, form.symmetric, float(np.clip(residual, *INNER)))
+        return [given + own for given, own in zip(missing, self.unknowns.spread(free), strict=True)]
+
+    def _solved(self, tangents: Sequence[Tangent], right: Array, is_symmetric: bool, tolerance: float) -> Array:
+        """Return the solution of a linear system, by GMRES where the matrix is not definite."""
+        components = range(len(right))
+        operators = [[tangent.block(i) for i in components] for tangent in tangents]
+        blocks = [blocks_of(own) for own in operators]
+        inverses = preconditioners(self.unknowns, blocks, operators, self.body.interfaces)
+
+        def product(x: Array) -> Array:
+            spread = zip(tangents, self.unknowns.spread(x), strict=True)
+            return self.unknowns.collect([tangent.apply(own) for tangent, own in spread])
+
+        def precondition(residual: Array) -> Array:
+            return np.stack([inverse(part) for inverse, part in zip(inverses, residual, strict=True)])
+
+        system = product, right, precondition, tolerance, self.linear_iterations
+        if is_symmetric and (found := conjugate_gradients(*system)).breakdown != INDEFINITE:
+            return np.asarray(found.x)
+        return np.asarray(generalized_residuals(*system).x)
 
     def _searched(
-        self, full: Array, step: Array, inner: Array, load: Array, is_reached: bool
-    ) -> tuple[Array, Array] | None:
+        self,
+        full: Sequence[Array],
+        step: Sequence[Array],
+        inner: Sequence[Array],
+        loads: Sequence[Array],
+        is_reached: bool,
+    ) -> tuple[list[Array], list[Array]] | None:
         """Return the coefficients after the step or a part of it, and the forces there; None where no part is accepted.
 
         A part is accepted where the forces along the step fall below a share of their earlier size, or where all forces
         become smaller; after a step that also changes coefficients on faces (not `is_reached`), finite forces suffice.
         """
-        free, length = ~self.is_fixed, 1.0
-        rest = (inner - load)[free]
-        before, size = ENOUGH * abs(float(rest @ step[free])), float(np.linalg.norm(rest))
+        rest, along = self._unbalanced(inner, loads), self.unknowns.chosen(step).ravel()
+        before, size = ENOUGH * abs(float(rest @ along)), float(np.linalg.norm(rest))
+        length = 1.0
         while length >= SHORTEST:
-            new = full + length * step
-            forces = self.forces.apply(new)
-            left = (forces - load)[free]
-            along, norm = abs(float(left @ step[free])), float(np.linalg.norm(left))
-            if np.isfinite(norm) and (not is_reached or along <= before or norm < size):
+            new = [own + length * change for own, change in zip(full, step, strict=True)]
+            forces = self._inner(new)
+            left = self._unbalanced(forces, loads)
+            work, norm = abs(float(left @ along)), float(np.linalg.norm(left))
+            if np.isfinite(norm) and (not is_reached or work <= before or norm < size):
                 return new, forces
             length *= 0.5
         return None
+
+    def _unbalanced(self, inner: Sequence[Array], loads: Sequence[Array]) -> Array:
+        """Return the forces (N,) of the unknowns that the loads do not balance."""
+        return self.unknowns.collect(_less(inner, loads)).ravel()
+
+
+def _less(inner: Sequence[Array], loads: Sequence[Array]) -> list[Array]:
+    return [force - load for force, load in zip(inner, loads, strict=True)]
+
+
+def _largest(parts: Sequence[Array]) -> float:
+    return max(float(np.abs(part).max(initial=0.0)) for part in parts)
 
 
 class _Loads:
@@ -240,19 +296,6 @@ class _Simple(Form):
         return grad
 
 
-def _solved(tangent: Tangent, right: Array, is_symmetric: bool, tolerance: float, most: int) -> Array:
-    """Return the solution of a linear system within the given iterations, by GMRES where the matrix is not definite."""
-    blocks = [fast_diagonalization(tangent.block(i)) for i in range(len(right))]
-
-    def precondition(residual: Array) -> Array:
-        return np.stack([block(part) for block, part in zip(blocks, residual, strict=True)])
-
-    system = tangent.apply_free, right, precondition, tolerance, most
-    if is_symmetric and (found := conjugate_gradients(*system)).breakdown != INDEFINITE:
-        return np.asarray(found.x)
-    return np.asarray(generalized_residuals(*system).x)
-
-
 def _failed(history: list[float], why: str) -> str:
     """Return the message of a failure of Newton's method with its remedy, in one line."""
     return (
@@ -261,17 +304,27 @@ def _failed(history: list[float], why: str) -> str:
     )
 
 
-def _solution(patch: PatchProblem, full: Array, balance: _Balance, history: list[float], more: int) -> Solution:
+def _solution(
+    body: Body,
+    problem: BoundaryValueProblem,
+    patches: Sequence[PatchProblem],
+    full: Sequence[Array],
+    balance: _Balance,
+    history: list[float],
+    more: int,
+) -> Solution:
     """Return the solution, with its errors where the exact solution is known."""
-    volume, problem, space, errors = patch.volume, patch.problem, patch.space, None
+    errors = None
     if problem.exact is not None:
-        errors = error_norms([Part(volume, space, full, problem.exact_at)], balance.forces.threads)
-    dofs = len(full) * space.dofs
-    doubtful, meaningful = judge(problem, [patch], errors, None, dofs)
+        rows = zip(patches, full, strict=True)
+        parts = [Part(patch.volume, patch.space, own, patch.problem.exact_at) for patch, own in rows]
+        errors = error_norms(parts, balance.forces[0].threads)
+    dofs = len(full[0]) * balance.unknowns.count
+    doubtful, meaningful = judge(problem, patches, errors, None, dofs)
     report = SolveReport(
-        elements=space.elements,
+        elements=sum(patch.space.elements for patch in patches),
         dofs=dofs,
-        h=longest_edge(volume, space),
+        h=max(longest_edge(patch.volume, patch.space) for patch in patches),
         iterations=len(history) - more,
         converged=True,
         residual=history[-1],
@@ -281,5 +334,4 @@ def _solution(patch: PatchProblem, full: Array, balance: _Balance, history: list
         meaningful=meaningful,
         residuals=tuple(history),
     )
-    coefficients = full[0] if len(full) == 1 else np.moveaxis(full, 0, -1)
-    return Solution(space.degrees, space.knots, coefficients, volume, report=report, problem=problem)
+    return Solution.of(field_of(body, patches, full), [patch.problem for patch in patches], report, problem)

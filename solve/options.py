@@ -8,7 +8,7 @@ from typing import Any, Self
 
 from parameterize.threads import default_threads
 
-from .field import MultiPatchField, SplineField
+from .field import FieldOnBody
 from .forms.boundary_value_problem import BoundaryValueProblem
 from .forms.poisson import Poisson
 
@@ -26,7 +26,7 @@ class IterationOptions:
     max_iterations: int = 1000
     certified: str | None = None
     device: str = "cpu"
-    start: SplineField | MultiPatchField | None = None
+    start: FieldOnBody | None = None
     estimate: bool | None = None
     strict: bool = False
 

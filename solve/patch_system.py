@@ -12,7 +12,7 @@ from .discretization.operator import FormOperator, Operator, with_mass
 from .discretization.space import TrialSpace
 from .discretization.weak import WeakFace
 from .forms.boundary_value_problem import BoundaryValueProblem
-from .linear.preconditioner import FastDiagonalization, fast_diagonalization
+from .linear.preconditioner import FastDiagonalization, blocks_of
 from .options import SolveOptions
 
 
@@ -48,8 +48,7 @@ class PatchSystem(PatchProblem):
         matrix, loads, known = assemble_data(volume, problem, space, options)
         if shift != 0.0:
             matrix = with_mass(volume, matrix, problem.form, shift)
-        operators = (matrix,) if isinstance(matrix, Operator) else tuple(map(matrix.block, range(len(known))))
-        has_unknowns = all(part.stop > part.start for part in space.free)
+        operators = scalar_operators(matrix, len(known))
         return cls(
             volume,
             problem,
@@ -58,7 +57,7 @@ class PatchSystem(PatchProblem):
             known=known,
             loads=loads,
             operators=operators,
-            blocks=tuple(fast_diagonalization(operator) if has_unknowns else None for operator in operators),
+            blocks=blocks_of(operators),
         )
 
     @property
@@ -74,3 +73,8 @@ class PatchSystem(PatchProblem):
     def at_rest(self) -> "PatchSystem":
         """Return the same system with the value zero wherever values are given."""
         return replace(self, known=np.zeros_like(self.known))
+
+
+def scalar_operators(matrix: Operator | FormOperator, components: int) -> tuple[Operator, ...]:
+    """Return the scalar operator of each component, a single one where it serves all."""
+    return (matrix,) if isinstance(matrix, Operator) else tuple(map(matrix.block, range(components)))

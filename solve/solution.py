@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,7 +14,7 @@ from parameterize.spline.body import Body
 from parameterize.spline.volume import BSplineVolume
 
 from .discretization.errors import Errors
-from .field import MultiPatchField, SplineField
+from .field import BodyField, SplineField
 from .forms.boundary_value_problem import BoundaryValueProblem
 from .forms.form import Quantity
 from .quantities import Extremes, all_extremes, at_points, extremes, on_grid
@@ -122,17 +122,66 @@ class SolveReport:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Solution(SplineField, Shown):
-    """Hold the discrete solution: a spline of the parameters, its map, its report, and the problem that it solves.
+class PatchSolution(SplineField):
+    """Hold the discrete solution on one patch: a spline of the parameters, its map, and the problem on this patch.
 
     Attributes
     ----------
     geometry : BSplineVolume
         The map.
+    problem : Poisson, Elasticity or Problem
+        The problem with the data of this patch.
+
+    Examples
+    --------
+    >>> import iga_nn
+    >>> from solve import benchmark_volume
+    >>> (patch,) = iga_nn.solve(benchmark_volume(2), iga_nn.Poisson(exact="x*y*z")).patches
+    >>> patch.quantity("gradient", [[0.5, 0.5, 0.5]]).shape
+    (1, 1, 3)
+    """
+
+    geometry: BSplineVolume
+    problem: BoundaryValueProblem = field(kw_only=True, repr=False)
+
+    @property
+    def field(self) -> SplineField:
+        """Return the spline alone, as a datum for another problem on the same volume."""
+        return SplineField(self.degrees, self.knots, self.coefficients, self.geometry)
+
+    def quantity(self, what: str | Quantity, points: ArrayLike) -> Array:
+        """Return a quantity (m, ...) at parameters (m, 3); `what` as in `Solution.quantity`."""
+        return at_points(self, self.problem.form, what, points)
+
+    def quantity_grid(self, what: str | Quantity, u: ArrayLike, v: ArrayLike, w: ArrayLike) -> Array:
+        """Return a quantity (len(u), len(v), len(w), ...) on a tensor grid of parameters."""
+        return on_grid(self, self.problem.form, what, u, v, w)
+
+    def extremes(self, what: str | Quantity) -> Extremes:
+        """Return the least and the largest value of a quantity of one number a point, and their places."""
+        return extremes(self, self.problem.form, what)
+
+    def all_extremes(self) -> dict[str, Extremes]:
+        """Return the extremes of a report, by name (`problem.form.reported`), from one search for all quantities."""
+        return all_extremes(self, self.problem.form)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Solution(BodyField, Shown):
+    """Hold the discrete solution: a spline of the parameters of each patch, the maps, the report and the problem.
+
+    On one patch it has the parts of the spline: `degrees`, `knots`, `coefficients`, values at parameters and `grid`.
+
+    Attributes
+    ----------
+    patches : tuple of PatchSolution
+        The solution on each patch.
+    body : Body
+        The maps; `geometry` is the same, or the volume of one patch.
     report : SolveReport
         Unknowns, errors, iterations and seconds.
     problem : Poisson, Elasticity or Problem
-        The problem that the spline solves.
+        The problem that the splines solve.
 
     Examples
     --------
@@ -141,46 +190,83 @@ class Solution(SplineField, Shown):
     >>> solution = iga_nn.solve(benchmark_volume(2), iga_nn.Poisson(exact="x*y*z"))
     >>> solution([[0.5, 0.5, 0.5]]).shape, solution.grid([0.1, 0.9], [0.5], [0.5]).shape
     ((1,), (2, 1, 1))
+    >>> halves = [iga_nn.BSplineVolume.from_function(lambda u, v, w, a=a: (u + a, v, w), 4) for a in (0, 1)]
+    >>> solution = iga_nn.solve(iga_nn.Body.from_patches(halves), iga_nn.Poisson(exact="x*y*z"))
+    >>> solution.report.dofs, solution.probe([[1.5, 0.5, 0.5]]).round(6)
+    (112, array([0.375]))
     """
 
-    geometry: BSplineVolume
-    report: SolveReport = field(kw_only=True)
-    problem: BoundaryValueProblem = field(kw_only=True)
+    patches: tuple[PatchSolution, ...]
+    body: Body = field(repr=False)
+    report: SolveReport
+    problem: BoundaryValueProblem
+
+    @classmethod
+    def of(
+        cls,
+        field: BodyField,
+        problems: Iterable[BoundaryValueProblem],
+        report: SolveReport,
+        problem: BoundaryValueProblem,
+    ) -> "Solution":
+        """Return the solution that is a field, with the problem on each patch."""
+        body = field.on_body
+        parts = zip(field.patches, body, problems, strict=True)
+        patches = (
+            PatchSolution(one.degrees, one.knots, one.coefficients, volume, problem=own) for one, volume, own in parts
+        )
+        return cls(tuple(patches), body, report, problem)
 
     @property
-    def field(self) -> SplineField:
-        """Return the spline without the report, as a datum for another problem on the same volume."""
-        return SplineField(self.degrees, self.knots, self.coefficients, self.geometry)
+    def only(self) -> PatchSolution:
+        """Return the solution on the patch of a body of one. Raises ValueError for several."""
+        return cast(PatchSolution, super().only)
+
+    @property
+    def field(self) -> BodyField:
+        """Return the splines without the report, as a datum for another problem on the same body."""
+        return BodyField(tuple(patch.field for patch in self.patches), self.body)
 
     def quantity(self, what: str | Quantity, points: ArrayLike) -> Array:
-        """Return a quantity (m, ...) at parameters (m, 3); NaN for parameters NaN, as of points outside of the volume.
+        """Return a quantity (m, ...) at parameters (m, 3) of one patch, on several at points (m, 3) in space.
 
         what: a name from the law's quantities, as "gradient", "flux", of elasticity "stress", "von_mises" and others
-        (`problem.form.quantities`); or a function of u (c, m), grad (c, 3, m) and x (3, m) that returns (..., m). For
-        points in space: solution.quantity(what, solution.geometry.locate(points)). Raises ValueError for another name,
-        and for a function that fails or returns another shape.
+        (`problem.form.quantities`); or a function of u (c, m), grad (c, 3, m) and x (3, m) that returns (..., m).
+        Values are NaN for parameters NaN, and outside of the body. For points in space of one patch:
+        solution.quantity(what, solution.geometry.locate(points)), for parameters of one of several:
+        solution.patches[i].quantity. Raises ValueError for another name, and for a function that fails or returns
+        another shape.
         """
-        return at_points(self, self.problem.form, what, points)
+        if self.is_single:
+            return self.only.quantity(what, points)
+        owners, where = self.body.locate(points)
+        first = self.patches[0].quantity(what, np.where((owners == 0)[:, None], where, np.nan))
+        for number, patch in enumerate(self.patches[1:], start=1):
+            here = owners == number
+            if here.any():
+                first[here] = patch.quantity(what, where[here])
+        return first
 
     def quantity_grid(self, what: str | Quantity, u: ArrayLike, v: ArrayLike, w: ArrayLike) -> Array:
-        """Return a quantity (len(u), len(v), len(w), ...) on a tensor grid of parameters; `what` as in `quantity`."""
-        return on_grid(self, self.problem.form, what, u, v, w)
+        """Return a quantity (len(u), len(v), len(w), ...) on a tensor grid of parameters of one patch."""
+        return self.only.quantity_grid(what, u, v, w)
 
     def extremes(self, what: str | Quantity) -> Extremes:
         """Return the least and the largest value of a quantity of one number a point, and their places."""
-        return extremes(self, self.problem.form, what)
+        return _outermost([patch.extremes(what) for patch in self.patches])
 
     def all_extremes(self) -> dict[str, Extremes]:
         """Return the extremes of a report, by name (`problem.form.reported`), from one search for all quantities.
 
         The search uses fewer samples than `extremes` on fine meshes.
         """
-        return all_extremes(self, self.problem.form)
+        each = [patch.all_extremes() for patch in self.patches]
+        return {name: _outermost([found[name] for found in each]) for name in each[0]}
 
     def to_pyvista(
         self, samples: int | None = None, quantities: Iterable[str] | Mapping[str, Quantity] | None = None
     ) -> "pyvista.UnstructuredGrid":
-        """Return the volume as a grid of pyvista with the solution as point data `u`.
+        """Return the body as a grid of pyvista with the solution as point data `u`, of several patches with `patch`.
 
         samples: None for exact Bezier cells; otherwise the number of linear cells a span of the solution and direction,
         with the distortion `arap`, `det J` and, where the exact solution is known, the `error`. Only linear cells can
@@ -188,14 +274,14 @@ class Solution(SplineField, Shown):
         `quantity`); by default stress and von_mises of elasticity, gradient and flux of other laws; () for none. Raises
         ValueError for a name the law does not have, and for quantities without samples.
         """
-        return above("io.view").grid(self.geometry, self, self.problem, samples, quantities)
+        return above("io.view").grid(self.body, self, self.problem, samples, quantities)
 
     def to_splinepy(self) -> Any:
-        """Return u_h as a splinepy.BSpline of one coordinate, or of three for displacements, in the parameters.
+        """Return u_h of one patch as a splinepy.BSpline of one coordinate, or of three for displacements.
 
         Raises InputError without splinepy.
         """
-        return above("io.splinepy").to_splinepy(self)
+        return above("io.splinepy").to_splinepy(self.only)
 
     def plot(self, what: str = "values", file: str | Path | None = None) -> "Figure":
         """Return a figure of the solution, drawn off screen; report.html shows the same figure.
@@ -205,74 +291,6 @@ class Solution(SplineField, Shown):
         here.
         """
         return above("figures.solution").plot_solution(self, what, file)
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class MultiPatchSolution(MultiPatchField, Shown):
-    """Hold the discrete solution on several patches: a spline of the parameters of each patch.
-
-    Attributes
-    ----------
-    patches : tuple of Solution
-        The solution on each patch, with the body's report.
-    geometry : Body
-        The maps.
-    report : SolveReport
-        Unknowns, errors, iterations and seconds of the body.
-    problem : Poisson, Elasticity or Problem
-        The problem that the splines solve.
-
-    Examples
-    --------
-    >>> import iga_nn
-    >>> halves = [iga_nn.BSplineVolume.from_function(lambda u, v, w, a=a: (u + a, v, w), 4) for a in (0, 1)]
-    >>> rod = iga_nn.Body.from_patches(halves)
-    >>> solution = iga_nn.solve(rod, iga_nn.Poisson(exact="x*y*z"))
-    >>> solution.report.dofs, solution.probe([[1.5, 0.5, 0.5]]).round(6)
-    (112, array([0.375]))
-    """
-
-    patches: tuple[Solution, ...]
-    geometry: Body
-    report: SolveReport
-    problem: BoundaryValueProblem
-
-    @property
-    def field(self) -> MultiPatchField:
-        """Return the splines without the report, as a datum for another problem on the same body."""
-        return MultiPatchField(tuple(patch.field for patch in self.patches))
-
-    def quantity(self, what: str | Quantity, points: ArrayLike) -> Array:
-        """Return a quantity (m, ...) at points (m, 3) in space; NaN outside of the body.
-
-        what: a name or a function, as in `Solution.quantity`; at parameters of a patch use `patches[i].quantity`.
-        """
-        owners, where = self.geometry.locate(points)
-        first = self.patches[0].quantity(what, np.where((owners == 0)[:, None], where, np.nan))
-        for number, patch in enumerate(self.patches[1:], start=1):
-            here = owners == number
-            if here.any():
-                first[here] = patch.quantity(what, where[here])
-        return first
-
-    def extremes(self, what: str | Quantity) -> Extremes:
-        """Return the least and the largest value of a quantity of one number a point, and their places."""
-        return _outermost([patch.extremes(what) for patch in self.patches])
-
-    def plot(self, what: str = "values", file: str | Path | None = None) -> "Figure":
-        """Return a figure of the solution; as `Solution.plot`."""
-        return above("figures.solution").plot_solution(self, what, file)
-
-    def to_pyvista(
-        self, samples: int | None = None, quantities: Iterable[str] | Mapping[str, Quantity] | None = None
-    ) -> "pyvista.UnstructuredGrid":
-        """Return the body as a grid of pyvista with the solution, the cell data `patch`; as `Solution.to_pyvista`."""
-        return above("io.view").grid(self.geometry, self, self.problem, samples, quantities)
-
-    def all_extremes(self) -> dict[str, Extremes]:
-        """Return the extremes of a report, by name (`problem.form.reported`)."""
-        each = [patch.all_extremes() for patch in self.patches]
-        return {name: _outermost([found[name] for found in each]) for name in each[0]}
 
 
 def _outermost(found: Sequence[Extremes]) -> Extremes:

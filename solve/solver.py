@@ -2,14 +2,13 @@
 
 import functools
 from dataclasses import replace
-from typing import Any, overload
+from typing import Any
 
 import numpy as np
 
 from parameterize.compilation import compilation_told
 from parameterize.spline.body import Body, BodyLike, as_body
 from parameterize.spline.bspline import greville, open_uniform_knots
-from parameterize.spline.interface import face_label
 from parameterize.spline.volume import BSplineVolume
 
 from .assembly import assemble_data, balanced
@@ -25,15 +24,11 @@ from .forms.poisson import Poisson
 from .forms.problem import Problem
 from .options import SolveOptions, check_device
 from .patch_system import PatchProblem
-from .solution import MultiPatchSolution, Solution
+from .solution import Solution
 from .system import System, build
 
 
-@overload
-def solve_problem(body: BSplineVolume, problem: Poisson | Elasticity | Problem, **how: Any) -> Solution: ...
-@overload
-def solve_problem(body: Body, problem: Poisson | Elasticity | Problem, **how: Any) -> MultiPatchSolution: ...
-def solve_problem(body: BodyLike, problem: Poisson | Elasticity | Problem, **how: Any) -> Solution | MultiPatchSolution:
+def solve_problem(body: BodyLike, problem: Poisson | Elasticity | Problem, **how: Any) -> Solution:
     """Solve a problem on a volume, or on several patches.
 
     Parameters
@@ -66,7 +61,7 @@ def solve_problem(body: BodyLike, problem: Poisson | Elasticity | Problem, **how
         Verdict of the map's certificate, if known; a verdict other than "certified" gives a notice.
     device : str
         "cpu", or "cuda" for the iteration on a GPU (Poisson's equation without Robin faces).
-    start : SplineField or MultiPatchField, optional
+    start : SplineField or BodyField, optional
         Solution in a subspace, such as the space of one refinement less: the iteration starts there instead of at zero,
         which saves a third of the iterations on maps that need many.
     estimate : bool, optional
@@ -77,8 +72,8 @@ def solve_problem(body: BodyLike, problem: Poisson | Elasticity | Problem, **how
 
     Returns
     -------
-    Solution or MultiPatchSolution
-        The spline u_h, its `field` and its `report`; of several patches a spline each.
+    Solution
+        The spline u_h of each patch, its `field` and its `report`.
 
     Raises
     ------
@@ -102,11 +97,7 @@ def solve_problem(body: BodyLike, problem: Poisson | Elasticity | Problem, **how
     return solve_with(body, problem, SolveOptions.of(how))
 
 
-@overload
-def solve_with(body: BSplineVolume, problem: BoundaryValueProblem, options: SolveOptions) -> Solution: ...
-@overload
-def solve_with(body: Body, problem: BoundaryValueProblem, options: SolveOptions) -> MultiPatchSolution: ...
-def solve_with(body: BodyLike, problem: BoundaryValueProblem, options: SolveOptions) -> Solution | MultiPatchSolution:
+def solve_with(body: BodyLike, problem: BoundaryValueProblem, options: SolveOptions) -> Solution:
     """Return the solution of `solve_problem` for options in one object."""
     check_device(options.device, problem)
     return discretized(body, problem, options).solve_with(options)
@@ -147,14 +138,15 @@ def discretize(
 
 def discretized(body: BodyLike, problem: BoundaryValueProblem, options: SolveOptions, is_loose: bool = False) -> System:
     """Return the system of `discretize`; that of a loose body, for its modes, needs no supports."""
-    placed, patches = prepared(body, problem, options)
+    glued = as_body(body)
+    placed, patches = prepared(glued, problem, options)
     if not is_loose:
         problem.demand_held()
-    return build(body, placed, patches, options, is_loose=is_loose)
+    return build(glued, placed, patches, options, is_loose=is_loose)
 
 
 def prepared(
-    body: BodyLike, problem: BoundaryValueProblem, options: SolveOptions
+    body: Body, problem: BoundaryValueProblem, options: SolveOptions
 ) -> tuple[BoundaryValueProblem, list[PatchProblem]]:
     """Check body and problem; return the problem placed in the body, and the problem on each patch."""
     placed, patches = _on_patches(body, problem, options)
@@ -168,35 +160,30 @@ def prepared(
 
 
 def _on_patches(
-    body: BodyLike, problem: BoundaryValueProblem, options: SolveOptions
+    body: Body, problem: BoundaryValueProblem, options: SolveOptions
 ) -> tuple[BoundaryValueProblem, list[PatchProblem]]:
     """Return the problem placed in the body, and the problem on each patch."""
-    glued, several = as_body(body), isinstance(body, Body)
     if not isinstance(problem, BoundaryValueProblem):
         raise TypeError(f"problem must be a Poisson, an Elasticity or a Problem, got {type(problem).__name__}")
-    if several and options.comm is not None and options.comm.size > 1:
+    if not body.is_single and options.comm is not None and options.comm.size > 1:
         raise ValueError("a body of several patches is solved by one process: leave comm out")
-    _demand_known_patches(glued, problem, several)
+    _demand_known_patches(body, problem)
     placed, patches = problem.on(body), []
-    for i, (volume, faces) in enumerate(zip(glued.patches, glued.outer, strict=True)):
-        own = placed.on_patch(i, faces) if several else placed
-        space = trial_space(volume, options.refine, options.degree, own.dirichlet, faces)
-        own_ways = (interface.ring for interface in glued.interfaces if interface.first[0] == i)
+    for i, (volume, own) in enumerate(zip(body, placed.on_patches(body), strict=True)):
+        space = trial_space(volume, options.refine, options.degree, own.dirichlet, body.outer[i])
+        own_ways = (interface.ring for interface in body.interfaces if interface.first[0] == i)
         rings = tuple(way for way in own_ways if way is not None)
         patches.append(PatchProblem(volume, own, replace(space, periodic=rings)))
     return placed, patches
 
 
-def _demand_known_patches(body: Body, problem: BoundaryValueProblem, several: bool) -> None:
-    """Raise ValueError for data of faces that are not outer faces of the body, and of patches that it does not have.
-
-    several: whether faces are called by their patches, too, as "p2_u0".
-    """
-    outer = {face_label(i, face) for i, faces in enumerate(body.outer) for face in faces if several}
+def _demand_known_patches(body: Body, problem: BoundaryValueProblem) -> None:
+    """Raise ValueError for data of faces that are not outer faces of the body, and of patches that it does not have."""
+    outer = {body.face_name(i, face) for i, faces in enumerate(body.outer) for face in faces}
     if unknown := sorted(problem.patch_faces - outer):
-        faces = ", ".join(sorted(outer)) or "u0 to w1"
+        faces = "u0 to w1" if body.is_single else ", ".join(sorted(outer))
         raise ValueError(f"{unknown[0]} is no outer face of the body; its faces are {faces}")
-    for name, numbers in problem.by_patch.items() if several else ():
+    for name, numbers in problem.by_patch.items() if not body.is_single else ():
         if beyond := sorted(numbers - set(range(len(body))), key=str):
             raise ValueError(f"{name}: there is no patch {beyond[0]!r}; the body has {len(body)}, from 0 on")
 
@@ -209,7 +196,7 @@ def check_problem(body: BodyLike, problem: BoundaryValueProblem, comm: Any = Non
     """
     problem.demand_held()
     options = SolveOptions(threads=1, quadrature="gauss", comm=comm)
-    _, patches = _on_patches(body, problem, options)
+    _, patches = _on_patches(as_body(body), problem, options)
     patches = [replace(patch, space=shared_space(patch.space, comm)) for patch in patches]
     loads, faces = [], []
     for patch in patches:
@@ -237,7 +224,7 @@ def _warm_up(degrees: tuple[int, int, int], degree: int | None, is_scalar: bool)
     np.empty(2**21)
     knots = [open_uniform_knots(p + 1, p) for p in degrees]
     rows = [greville(row, p) for row, p in zip(knots, degrees, strict=True)]
-    cube = BSplineVolume(degrees, tuple(knots), np.stack(np.meshgrid(*rows, indexing="ij"), axis=-1))  # type: ignore[arg-type]
+    cube = as_body(BSplineVolume(degrees, tuple(knots), np.stack(np.meshgrid(*rows, indexing="ij"), axis=-1)))  # type: ignore[arg-type]
     problem = Poisson(exact="sin(x)") if is_scalar else Elasticity(exact=("sin(x)", "y", "z"))
     with compilation_told():
         options = SolveOptions(refine=1, degree=degree, threads=1)

@@ -12,7 +12,7 @@ from scipy.sparse.linalg import LinearOperator
 
 from parameterize.arrays import Array
 from parameterize.conjugate_gradients import LinearResult, conjugate_gradients
-from parameterize.spline.body import Body, BodyLike, as_body
+from parameterize.spline.body import Body
 from parameterize.spline.interface import Interface
 from parameterize.threads import one_blas_thread
 
@@ -24,7 +24,7 @@ from .discretization.on_regions import demand_area, demand_supports
 from .discretization.operator import FormOperator, MatrixFree, Operator, assemble
 from .discretization.space import TrialSpace, embedded, longest_edge
 from .discretization.unknowns import Glued, Unknowns, unknowns_of
-from .field import MultiPatchField, SplineField
+from .field import BodyField, FieldOnBody, SplineField
 from .forms.boundary_value_problem import BoundaryValueProblem
 from .forms.mass import Mass
 from .linear.krylov import generalized_residuals
@@ -33,7 +33,7 @@ from .linear.preconditioner import FastDiagonalization
 from .options import IterationOptions, SolveOptions, check_device
 from .patch_system import PatchProblem, PatchSystem
 from .reactions import balance
-from .solution import MultiPatchSolution, Solution, SolveReport
+from .solution import Solution, SolveReport
 
 LARGEST_VALUE = 1e150  # of a solution: the squares of larger ones overflow
 CONTINUOUS = "the error is not estimated: across interfaces of patches the gradient jumps; compare two refinements"
@@ -81,7 +81,7 @@ class System:
     (0, (5, 5, 5))
     """
 
-    body: BodyLike
+    body: Body
     problem: BoundaryValueProblem
     patches: tuple[PatchSystem, ...]
     unknowns: Unknowns
@@ -127,15 +127,14 @@ class System:
         """Return the same system with the value zero wherever values are given; its fields are zero there."""
         return replace(self, patches=tuple(patch.at_rest() for patch in self.patches))
 
-    def field(self, x: Array) -> SplineField | MultiPatchField:
-        """Return the spline of the free coefficients x (N,) and the fixed coefficients; of several patches one each.
+    def field(self, x: Array) -> BodyField:
+        """Return the spline on each patch of the free coefficients x (N,) and the fixed coefficients.
 
         Raises ValueError for another number of coefficients.
         """
         if np.size(x) != self.right.size:
             raise ValueError(f"x must have {self.right.size} entries, the free coefficients, got {np.size(x)}")
-        found = self._splines(self._filled(np.reshape(x, self.right.shape)))
-        return MultiPatchField(tuple(found)) if isinstance(self.body, Body) else found[0]
+        return field_of(self.body, self.patches, self._filled(np.reshape(x, self.right.shape)))
 
     def _filled(self, free: Array) -> list[Array]:
         """Return all coefficients (c, n_u, n_v, n_w) of each patch, with the fixed coefficients."""
@@ -145,28 +144,12 @@ class System:
             found.append(full)
         return found
 
-    def vector(self, field: SplineField | MultiPatchField) -> Array:
+    def vector(self, field: FieldOnBody) -> Array:
         """Return the free coefficients (N,) of a field in this space, or in a space that this one contains.
 
         Raises ValueError for any other field.
         """
-        fields = field.patches if isinstance(field, MultiPatchField) else (field,)
-        if len(fields) != len(self.patches):
-            raise ValueError(f"the field has {len(fields)} patches, the body {len(self.patches)}")
-        found = []
-        for own, patch in zip(fields, self.patches, strict=True):
-            full = embedded(own.coefficients, own.degrees, own.knots, patch.space)
-            found.append(full[None] if full.ndim == 3 else np.moveaxis(full, -1, 0))
-        return self.unknowns.chosen(found).ravel()
-
-    def _splines(self, full: Sequence[Array]) -> list[SplineField]:
-        """Return the splines of coefficients (c, n_u, n_v, n_w), gathered from all processes."""
-        found = []
-        for patch, own in zip(self.patches, full, strict=True):
-            whole = patch.space.gather(own[:, patch.space.own])
-            coefficients = whole[0] if len(whole) == 1 else np.moveaxis(whole, 0, -1)
-            found.append(SplineField(patch.space.degrees, patch.space.whole.knots, coefficients, patch.volume))
-        return found
+        return self.unknowns.chosen(coefficients_in(field, self.patches)).ravel()
 
     def precondition(self, residual: Array) -> Array:
         """Return the preconditioner times the free coefficients (c, ...)."""
@@ -181,7 +164,7 @@ class System:
         adjoint = {"rmatvec": product} if self.problem.form.symmetric else {}
         return LinearOperator((size, size), matvec=product, dtype=np.float64, **adjoint)
 
-    def solve(self, **how: Any) -> Solution | MultiPatchSolution:
+    def solve(self, **how: Any) -> Solution:
         """Solve the system, and return the solution with its errors and notices.
 
         how: tolerance, max_iterations, certified, device, start, estimate and strict, as in `iga_nn.solve`. Raises
@@ -190,10 +173,10 @@ class System:
         """
         return self.solve_with(IterationOptions.of(how))
 
-    def solve_with(self, options: IterationOptions) -> Solution | MultiPatchSolution:
+    def solve_with(self, options: IterationOptions) -> Solution:
         """Return the solution of `solve` for options in one object."""
         check_device(options.device, self.problem)
-        if isinstance(self.body, Body) and options.device != "cpu":
+        if not self.body.is_single and options.device != "cpu":
             raise ValueError(f"several patches are solved on device='cpu' only, got device={options.device!r}")
         with one_blas_thread():
             solution = self._solve(options)
@@ -203,7 +186,7 @@ class System:
             raise ConvergenceError(solution.report.notices[-1], solution)
         return solution
 
-    def _solve(self, options: IterationOptions) -> Solution | MultiPatchSolution:
+    def _solve(self, options: IterationOptions) -> Solution:
         problem, space = self.problem, self.space
         dofs = len(self.right) * self.unknowns.count
         clock, sent = [time.process_time()], space.traffic()
@@ -246,13 +229,8 @@ class System:
             traffic=traffic,
             balance=balance(problem, self.patches, self.unknowns, full) if has_norm else None,
         )
-        solutions = tuple(
-            Solution(field.degrees, field.knots, field.coefficients, patch.volume, report=report, problem=patch.problem)
-            for field, patch in zip(self._splines(full), self.patches, strict=True)
-        )
-        if isinstance(self.body, Body):
-            return MultiPatchSolution(solutions, self.body, report, problem)
-        return solutions[0]
+        problems = [patch.problem for patch in self.patches]
+        return Solution.of(field_of(self.body, self.patches, full), problems, report, problem)
 
     def _parts(self, full: Sequence[Array]) -> list[Part]:
         """Return coefficients (c, n_u, n_v, n_w) of each patch with the exact values, zero where none are known."""
@@ -315,13 +293,37 @@ class System:
         return replace(found, x=found.x[own])
 
 
+def coefficients_in(field: FieldOnBody, patches: Sequence[PatchProblem]) -> list[Array]:
+    """Return the coefficients (c, n_u, n_v, n_w) of a field in the space of each patch, which contains the field's.
+
+    Raises ValueError for any other field.
+    """
+    if len(field.patches) != len(patches):
+        raise ValueError(f"the field has {len(field.patches)} patches, the body {len(patches)}")
+    found = []
+    for own, patch in zip(field.patches, patches, strict=True):
+        full = embedded(own.coefficients, own.degrees, own.knots, patch.space)
+        found.append(full[None] if full.ndim == 3 else np.moveaxis(full, -1, 0))
+    return found
+
+
+def field_of(body: Body, patches: Sequence[PatchProblem], full: Sequence[Array]) -> BodyField:
+    """Return the field of coefficients (c, n_u, n_v, n_w) of each patch, gathered from all processes."""
+    found = []
+    for patch, own in zip(patches, full, strict=True):
+        whole = patch.space.gather(own[:, patch.space.own])
+        coefficients = whole[0] if len(whole) == 1 else np.moveaxis(whole, 0, -1)
+        found.append(SplineField(patch.space.degrees, patch.space.whole.knots, coefficients, patch.volume))
+    return BodyField(tuple(found), body)
+
+
 def _nothing(x: Array) -> tuple[Array, None]:
     """Return the value zero (1, ...) at points (3, ...)."""
     return np.zeros((1, *x.shape[1:])), None
 
 
 def build(
-    body: BodyLike,
+    body: Body,
     problem: BoundaryValueProblem,
     patches: Sequence[PatchProblem],
     options: SolveOptions,
@@ -334,14 +336,15 @@ def build(
     is_loose: whether motions that nothing holds are no fault; a body with a shift is loose.
     """
     is_loose = is_loose or shift != 0.0
-    start, glued = time.process_time(), as_body(body)
+    start = time.process_time()
     with one_blas_thread():
         systems = tuple(PatchSystem.of(patch, options, shift) for patch in patches)
-        _demand_held(glued, problem, systems, is_loose)
-        unknowns = unknowns_of([patch.space for patch in systems], glued.interfaces)
+        _demand_held(body, problem, systems, is_loose)
+        unknowns = unknowns_of([patch.space for patch in systems], body.interfaces)
         known = unknowns.completed([system.known for system in systems])
         systems = tuple(replace(system, known=own) for system, own in zip(systems, known, strict=True))
-        blocks = _preconditioners(unknowns, systems, glued.interfaces)
+        parts = [system.blocks for system in systems], [system.operators for system in systems]
+        blocks = preconditioners(unknowns, *parts, body.interfaces)
         if blocks[0].singular and not is_loose and isinstance(systems[0].matrix, FormOperator):
             raise ValueError(
                 f"{type(problem.form).__name__} without a reaction, and with Neumann data on all faces, does not "
@@ -369,22 +372,30 @@ def _demand_held(body: Body, problem: BoundaryValueProblem, systems: Sequence[Pa
                 demand_supports(problem, faces, space, [system.volume for system in part])
         except ValueError as error:
             raise ValueError(f"{named}: {error}" if len(parts) > 1 else str(error)) from None
-        if len(parts) > 1 and all(block is not None and block.singular for system in part for block in system.blocks):
-            raise ValueError(f"nothing fixes the solution on {named}, a part of its own: give it a value, or glue it")
+        if len(parts) > 1:
+            demand_fixed(numbers, [block for system in part for block in system.blocks])
 
 
-def _preconditioners(
-    unknowns: Unknowns, systems: Sequence[PatchSystem], interfaces: Sequence[Interface]
+def demand_fixed(part: Sequence[int], blocks: Sequence[FastDiagonalization | None]) -> None:
+    """Raise ValueError where the blocks of a part of a body, patches by their numbers, leave a constant free."""
+    if all(block is not None and block.singular for block in blocks):
+        named = ", ".join(f"p{number}" for number in part)
+        raise ValueError(f"nothing fixes the solution on {named}, a part of its own: give it a value, or glue it")
+
+
+def preconditioners(
+    unknowns: Unknowns,
+    blocks: Sequence[Sequence[FastDiagonalization | None]],
+    operators: Sequence[Sequence[Operator]],
+    interfaces: Sequence[Interface],
 ) -> tuple[Preconditioner, ...]:
-    """Return the preconditioner of each component."""
+    """Return the preconditioner of each component from the blocks and the scalar operators of each patch."""
     if not isinstance(unknowns, Glued):
-        return tuple(block for block in systems[0].blocks if block is not None)
+        return tuple(block for block in blocks[0] if block is not None)
     found = []
-    for component in range(len(systems[0].blocks)):
-        blocks = [system.blocks[component] for system in systems]
-        operators = [system.operators[component] for system in systems]
-        is_open = all(block is not None and block.singular for block in blocks)
-        held = tuple(block and block.held() for block in blocks)
-        weights, coarse = shares_of(unknowns, operators), Coarse.of(unknowns, operators, interfaces)
+    for of_component, scalar in zip(zip(*blocks, strict=True), zip(*operators, strict=True), strict=True):
+        is_open = all(block is not None and block.singular for block in of_component)
+        held = tuple(block and block.held() for block in of_component)
+        weights, coarse = shares_of(unknowns, scalar), Coarse.of(unknowns, scalar, interfaces)
         found.append(GluedPreconditioner(unknowns, weights, held, coarse, is_open))
     return tuple(found)

@@ -121,7 +121,7 @@ def test_python_prints_the_shapes_of_arrays(solution):
     volume = f"BSplineVolume(degrees=(3, 3, 3), knots={knots}, control_points=array(5, 5, 5, 3), weights=None)"
     assert repr(solution.geometry) == volume
     assert repr(solution).startswith(
-        f"Solution(degrees=(3, 3, 3), knots={knots}, coefficients=array(5, 5, 5), geometry"
+        f"Solution(patches=(PatchSolution(degrees=(3, 3, 3), knots={knots}, coefficients=array(5, 5, 5), geometry"
     )
     assert "'step': array" in repr(formula_parameterization())
 

@@ -195,9 +195,6 @@ def test_a_coarser_solution_is_a_start():
 
 
 def test_options_that_take_one_patch_say_so():
-    law = iga_nn.Poisson(source="1", boundary="0")
-    with pytest.raises(TypeError, match="volume must be a BSplineVolume"):
-        iga_nn.march(two(), law, "0", dt=0.1, steps=1)
     with pytest.raises(ValueError, match="kappa is given by patch"):
         iga_nn.solve(box((0, 0, 0)), iga_nn.Poisson(source="1", boundary="0", kappa={0: 1.0, 1: 2.0}))
 

@@ -12,7 +12,7 @@ from iga_nn.cli.commands import main
 from iga_nn.figures import render as rendering
 from parameterize.cube.boundary_map import BoundaryMap
 from parameterize.spline.body import Body
-from solve.field import MultiPatchField
+from solve.field import BodyField
 
 
 def bent_ell():
@@ -70,7 +70,7 @@ def test_a_run_on_blocks_solves_and_tells_what_they_distort(on_blocks, in_folder
     assert facts["surface_distance"]["two_sided"]["of_diagonal"]["rms"] < 2e-3
     assert levels[1]["l2_relative"] < levels[0]["l2_relative"] < 1e-3
     assert len(Body.load(in_folder / "out" / "volume.npz")) == 3
-    assert len(MultiPatchField.load(in_folder / "out" / "solution.npz").patches) == 3
+    assert len(BodyField.load(in_folder / "out" / "solution.npz").patches) == 3
     boundary = BoundaryMap.load(in_folder / "out" / "boundary.npz")
     assert on_blocks.points(boundary.patches, boundary.parameters) == pytest.approx(boundary.vertices, abs=1e-12)
     page = (in_folder / "out" / "report.html").read_text()

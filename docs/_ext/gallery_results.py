@@ -11,9 +11,10 @@ from typing import Any
 
 from sphinx.application import Sphinx
 
-from iga_nn.io.formats import load_field, load_volume
+from iga_nn.io.formats import load_volume
 from iga_nn.report.html import filled
 from iga_nn.report.viewer import scene_of
+from solve import BodyField
 
 FRAME = """
 .. raw:: html
@@ -59,7 +60,7 @@ def write_view(app: Sphinx, name: str) -> str:
         return ""
     solved = left / "solution.npz"
     body = load_volume(files[0])
-    scene = scene_of(body, load_field(solved, body) if solved.exists() else None, coarser=2)
+    scene = scene_of(body, BodyField.load(solved) if solved.exists() else None, coarser=2)
     still = base64.b64encode(pictures(app)[name].read_bytes()).decode("ascii")
     target = Path(app.outdir) / "scenes" / f"{name}.html"
     target.parent.mkdir(parents=True, exist_ok=True)

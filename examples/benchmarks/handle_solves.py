@@ -23,7 +23,7 @@ from iga_nn.level_table import csv_text
 from parameterize.files import save_text
 from parameterize.spline.body import as_body
 from parameterize.spline.sampled_boundary import SampledBoundary
-from solve import benchmark_volume
+from solve import Solution, benchmark_volume
 
 BodyLike = iga_nn.BSplineVolume | iga_nn.Body
 EXACT = "exp(X+Z)*sin(Y)"  # of Poisson's equation, and of each component of a displacement
@@ -136,7 +136,7 @@ def clamped_and_pulled(body: BodyLike) -> tuple[str, iga_nn.Elasticity]:
     return pulled, iga_nn.Elasticity(fix=fixed, load={pulled: tuple(np.eye(3)[axis].tolist())})
 
 
-def work_of(solution: iga_nn.MultiPatchSolution, pulled: str) -> float:
+def work_of(solution: Solution, pulled: str) -> float:
     """Return the work of the pull: the displacement along it, integrated over its region."""
     (direction,) = solution.problem.load.values()
     return float(np.dot(iga_nn.integrate(solution, "u", over=pulled), direction))

@@ -27,6 +27,7 @@ from parameterize import surface_from_arrays
 from parameterize.files import save_text
 from parameterize.spline.sampled_boundary import SampledBoundary
 from parameterize.surface.geometry import normals_and_areas
+from solve import Solution
 
 if TYPE_CHECKING:
     import skfem
@@ -92,7 +93,7 @@ def of_splines(body: iga_nn.Body, refine: int) -> tuple[int, Figures]:
     return solution.report.dofs, Figures(*figures, *(scale * one[k] for k in (0, 1) for one in means))
 
 
-def wall_of_splines(solution: iga_nn.MultiPatchSolution, side: float) -> tuple[float, float]:
+def wall_of_splines(solution: Solution, side: float) -> tuple[float, float]:
     """Return mean and maximum of the stress along the plate at the tops of the two holes near an end."""
     boundary = SampledBoundary.of(solution.geometry)
     corners = boundary.triangles

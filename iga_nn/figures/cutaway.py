@@ -41,8 +41,9 @@ def cut_of(body: BodyLike, faces: Sequence[Patch], points: Samples) -> tuple[Mas
     faces: the patches of the outer faces. points: of the body at rest. Of several patches the octants are left out that
     lie in the upper half and towards the viewer.
     """
-    if not isinstance(body, Body):
-        octant, view = best_cut(faces, orientation(body))
+    glued = as_body(body)
+    if glued.is_single:
+        octant, view = best_cut(faces, orientation(glued.only))
         return only(octant), view
     view = view_of(faces)
     return beyond(points, view.towards) & beyond(points, view.up), view

@@ -11,13 +11,12 @@ from numpy.typing import ArrayLike
 
 from parameterize.arrays import Array
 from parameterize.quality.distortion import arap_in_box, arap_on, own_box
-from parameterize.spline.body import Body, BodyLike, as_body
+from parameterize.spline.body import BodyLike, as_body
 from parameterize.spline.volume import AXES, FACE_NAMES, BSplineVolume
-from solve.field import MultiPatchField, Points, SplineField
+from solve.field import Points
 from solve.forms.boundary_value_problem import BoundaryValueProblem
 from solve.forms.frame import UnitFrame
 
-Solved = SplineField | MultiPatchField  # a solution on a body
 Grid = tuple[Array, Array, Array]  # parameters of a tensor grid; one direction has a single value
 
 SECTIONS = tuple(f"{axis} = 1/2" for axis in AXES)
@@ -56,20 +55,16 @@ def outer_faces(body: BodyLike) -> list[int]:
     return [PER_PATCH * i + FACE_NAMES.index(name) for i, names in each for name in names]
 
 
-def fields_on(solution: Solved) -> tuple[SplineField, ...]:
-    """Return the spline of each patch; of a volume the solution itself."""
-    return solution.patches if isinstance(solution, MultiPatchField) else (solution,)
-
-
 def arap_of(body: BodyLike) -> list[Callable[[Grid], Array]]:
     """Return for each patch the function that gives the ARAP distortion (n_u, n_v, n_w) on a tensor grid.
 
     A volume is measured at volume 1, each of several patches against its own box.
     """
-    if isinstance(body, Body):
-        return [_in_box(patch) for patch in body]
-    volume, scale = body, 1.0 / UnitFrame.of(body).length
-    return [lambda grid: arap_on(volume, *grid, scale)]
+    glued = as_body(body)
+    if not glued.is_single:
+        return [_in_box(patch) for patch in glued]
+    scale = 1.0 / UnitFrame.of(glued).length
+    return [lambda grid: arap_on(glued.only, *grid, scale)]
 
 
 def _in_box(patch: BSplineVolume) -> Callable[[Grid], Array]:
@@ -79,10 +74,7 @@ def _in_box(patch: BSplineVolume) -> Callable[[Grid], Array]:
 
 def problems_on(problem: BoundaryValueProblem, body: BodyLike) -> list[BoundaryValueProblem]:
     """Return the problem on each patch, with X, Y, Z measured in the body."""
-    placed = problem.on(body)
-    if not isinstance(body, Body):
-        return [placed]
-    return [placed.on_patch(i, faces) for i, faces in enumerate(body.outer)]
+    return problem.on(body).on_patches(as_body(body))
 
 
 def error_at(found: Array, problem: BoundaryValueProblem, x: Points) -> Array:

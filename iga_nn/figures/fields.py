@@ -12,13 +12,13 @@ from typing import Any, TypeVar
 import numpy as np
 
 from parameterize.arrays import Array
-from parameterize.spline.body import Body, BodyLike, as_body
-from solve.field import Points, SplineField
+from parameterize.spline.body import BodyLike, as_body
+from solve.field import FieldOnBody, Points, SplineField
 from solve.forms.boundary_value_problem import BoundaryValueProblem
 from solve.forms.form import Quantity
 from solve.quantities import grid_values
 
-from .evaluate import Grid, Solved, all_grids, arap_of, error_at, fields_on, flat, problems_on
+from .evaluate import Grid, all_grids, arap_of, error_at, flat, problems_on
 from .ranges import ColorRange, error_range, even_range
 
 SAMPLES = 121  # per direction of a face or mid-section
@@ -111,37 +111,37 @@ def distortion_of(body: BodyLike) -> Field:
         return lambda grid: np.tanh(np.sqrt(arap_at(grid)) / 2.0)
 
     found = sampled([colored(arap_at) for arap_at in arap_of(body)])
-    title = f"tanh(√ARAP / 2), {'each in its own box' if isinstance(body, Body) else 'at volume 1'}"
+    title = f"tanh(√ARAP / 2), {'at volume 1' if as_body(body).is_single else 'each in its own box'}"
     return Field(found.patches, found.lattices, "distortion", title, ColorRange(0.0, 1.0))
 
 
 @remembered
-def vectors_of(solution: Solved) -> Samples:
+def vectors_of(solution: FieldOnBody) -> Samples:
     """Return the vectors (..., c) of a solution of several components."""
-    return sampled([_on_grid(field) for field in fields_on(solution)])
+    return sampled([_on_grid(field) for field in solution.patches])
 
 
 @remembered
-def solution_of(solution: Solved) -> Field:
+def solution_of(solution: FieldOnBody) -> Field:
     """Return u_h, or the length of a vector u_h."""
     if is_scalar(solution):
-        found, name, title = sampled([_on_grid(field) for field in fields_on(solution)]), "solution", "u"
+        found, name, title = sampled([_on_grid(field) for field in solution.patches]), "solution", "u"
     else:
         found, name, title = _each(vectors_of(solution), lambda values: np.linalg.norm(values, axis=-1)), "|u|", "|u|"
     return Field(found.patches, found.lattices, name, title, even_range(found.everywhere))
 
 
-def is_scalar(solution: Solved) -> bool:
+def is_scalar(solution: FieldOnBody) -> bool:
     """Return whether a solution has one number a point, without an axis of components."""
-    return fields_on(solution)[0].coefficients.ndim == 3
+    return solution.patches[0].coefficients.ndim == 3
 
 
-def is_spatial(solution: Solved) -> bool:
+def is_spatial(solution: FieldOnBody) -> bool:
     """Return whether a solution is a vector of three components."""
-    return fields_on(solution)[0].coefficients.shape[3:] == (3,)
+    return solution.patches[0].coefficients.shape[3:] == (3,)
 
 
-def components_of(solution: Solved) -> list[Field]:
+def components_of(solution: FieldOnBody) -> list[Field]:
     """Return u_x, u_y and u_z of a vector of three components."""
     return [_component(vectors_of(solution), k, f"u_{axis}") for k, axis in enumerate("xyz")]
 
@@ -151,12 +151,12 @@ def _component(vectors: Samples, k: int, name: str) -> Field:
     return Field(found.patches, found.lattices, name, name, even_range(found.everywhere))
 
 
-def quantity_of(solution: Solved, quantity: Quantity | Sequence[Quantity], name: str, title: str) -> Field | None:
+def quantity_of(solution: FieldOnBody, quantity: Quantity | Sequence[Quantity], name: str, title: str) -> Field | None:
     """Return a quantity of one number a point, a function of u, grad and x; None where it is not finite everywhere.
 
     quantity: of several patches also a function for each, where their materials differ.
     """
-    fields = fields_on(solution)
+    fields = solution.patches
     laws = quantity if isinstance(quantity, Sequence) else [quantity] * len(fields)
 
     def found_on(field: SplineField, law: Quantity) -> Callable[[Grid], Array]:
@@ -172,12 +172,12 @@ def quantity_of(solution: Solved, quantity: Quantity | Sequence[Quantity], name:
 
 
 @remembered
-def fields_of(solution: Solved) -> list[Field]:
+def fields_of(solution: FieldOnBody) -> list[Field]:
     """Return the fields that show a solution, first the field of its picture; of a body that is von Mises' stress."""
     fields = [solution_of(solution)]
     if is_spatial(solution):
         fields += components_of(solution)
-    laws = [(quantities_of(field) or {}).get("von_mises") for field in fields_on(solution)]
+    laws = [(quantities_of(field) or {}).get("von_mises") for field in solution.patches]
     if None not in laws:
         stress = quantity_of(solution, [law for law in laws if law], STRESS, "von Mises stress")
         return fields if stress is None else [stress, *fields]
@@ -185,9 +185,9 @@ def fields_of(solution: Solved) -> list[Field]:
 
 
 @remembered
-def error_of(body: BodyLike, solution: Solved, problem: BoundaryValueProblem) -> Field:
+def error_of(body: BodyLike, solution: FieldOnBody, problem: BoundaryValueProblem) -> Field:
     """Return |u - u_h|, whose range is logarithmic. problem: its exact solution is known."""
-    parts = zip(as_body(body), fields_on(solution), problems_on(problem, body), strict=True)
+    parts = zip(as_body(body), solution.patches, problems_on(problem, body), strict=True)
 
     def found_on(patch: Any, field: SplineField, own: BoundaryValueProblem) -> Callable[[Grid], Array]:
         return lambda grid: error_at(field.grid(*grid), own, Points.on(patch, *grid))
@@ -197,7 +197,7 @@ def error_of(body: BodyLike, solution: Solved, problem: BoundaryValueProblem) ->
     return Field(found.patches, found.lattices, "error", "|u − uₕ|", limits)
 
 
-def quantities_of(solution: Solved) -> Mapping[str, Quantity] | None:
+def quantities_of(solution: FieldOnBody) -> Mapping[str, Quantity] | None:
     """Return the quantities of the law that is solved, None where it is not known."""
     problem = getattr(solution, "problem", None)
     return None if problem is None else problem.form.quantities

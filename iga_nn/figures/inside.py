@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from parameterize.arrays import Array
-from parameterize.spline.body import Body, BodyLike
+from parameterize.spline.body import BodyLike, as_body
 
 from .cutaway import beyond, visible
 from .evaluate import SECTIONS
@@ -23,7 +23,7 @@ def show_inside(panels: Any, body: BodyLike, points: Samples, patches: Sequence[
     Of a volume these are its mid-sections. Several patches are drawn without the octants on the far side of x, of y and
     of z, as one sees them from there.
     """
-    if not isinstance(body, Body):
+    if as_body(body).is_single:
         for panel, title, patch in zip(panels, SECTIONS, patches[6:], strict=True):
             show_section(panel, title, patch.points, patch.colors)
         return

@@ -10,7 +10,6 @@ from matplotlib.figure import Figure
 from parameterize.arrays import Array
 from parameterize.certificate.boundary import Meeting
 from parameterize.spline.body import Body, BodyLike, as_body
-from parameterize.spline.interface import face_label
 from parameterize.spline.volume import FACE_NAMES
 
 from .cutaway import cut_of, octant_label, patches_of, visible
@@ -31,15 +30,16 @@ def draw_faces(path: str | Path | None, body: BodyLike, marks: Array | None = No
     Of several patches the outer faces are drawn, in the colour of their patch and with their names. marks: points (k,
     3) shown as black balls, such as given corners (the paper's Fig. 13).
     """
-    if not isinstance(body, Body):
+    glued = as_body(body)
+    if glued.is_single:
         return _draw_around(path, body, 0, "Images of the six faces of the unit cube", marks)
-    return _draw_around(path, body, 0, "The patches and their outer faces", marks, _names_of(body))
+    return _draw_around(path, body, 0, "The patches and their outer faces", marks, _names_of(glued))
 
 
 def _names_of(body: Body) -> dict[str, Array]:
     """Return the names of the outer faces of patches, each with the point in the middle of the face."""
     patches = points_of(body).patches
-    named = {face_label(k // PER_PATCH, FACE_NAMES[k % PER_PATCH]): patches[k] for k in outer_faces(body)}
+    named = {body.face_name(k // PER_PATCH, FACE_NAMES[k % PER_PATCH]): patches[k] for k in outer_faces(body)}
     return {name: points[len(points) // 2, len(points) // 2] for name, points in named.items()}
 
 
@@ -86,7 +86,7 @@ def draw_cut(path: str | Path | None, body: BodyLike) -> Figure:
         panel.imshow(draw(visible(body, patches, left_out), view, PANEL))
     name_colors(figure, body)
     color_bar(figure, panels, field.limits, field.title)
-    if isinstance(body, Body):
+    if not as_body(body).is_single:
         return save(figure, path, "Cut open: the upper octants of the patches, towards the viewer, are left out")
     u, v, w = np.argwhere(left_out[0])[0].tolist()
     return save(figure, path, f"Cut open: the octant {octant_label((u, v, w))} is left out")
@@ -105,8 +105,8 @@ def draw_distortion(path: str | Path | None, body: BodyLike) -> Figure:
     ]
     show_inside(panels, body, points, patches)
     color_bar(figure, panels, field.limits, field.title)
-    several = isinstance(body, Body)
-    return save(figure, path, "Distortion of the patches inside" if several else "Distortion on the mid-sections")
+    is_single = as_body(body).is_single
+    return save(figure, path, "Distortion on the mid-sections" if is_single else "Distortion of the patches inside")
 
 
 def draw_folds(path: str | Path | None, body: BodyLike, places: Array) -> Figure:

@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from parameterize.spline.body import BodyLike, as_body, size_of
 from solve import Modes
 
-from .evaluate import all_grids, fields_on, flat, outer_faces
+from .evaluate import all_grids, flat, outer_faces
 from .ranges import ColorRange
 from .render import Patch, draw, view_of
 from .style import PANEL, colors, panels_of, save
@@ -27,7 +27,7 @@ def draw_modes(path: str | Path | None, body: BodyLike, modes: Modes) -> Figure:
     faces = [(k // len(grids), grids[k % len(grids)]) for k in outer_faces(body)]
     still = [flat(volumes[number].grid(*grid)) for number, grid in faces]
     for panel, (frequency, shape) in zip(axes.flat, shown, strict=False):
-        moved = [fields_on(shape)[number].grid(*grid) for number, grid in faces]
+        moved = [shape.patches[number].grid(*grid) for number, grid in faces]
         far = [flat(np.linalg.norm(by, axis=-1)) for by in moved]
         largest = max(float(values.max()) for values in far)
         limits = ColorRange(0.0, largest)

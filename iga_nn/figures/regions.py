@@ -11,8 +11,8 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch as Swatch
 
 from parameterize.arrays import Array, IntArray
-from parameterize.spline.body import Body, BodyLike, as_body
-from parameterize.spline.interface import axis_side, face_label
+from parameterize.spline.body import BodyLike, as_body
+from parameterize.spline.interface import axis_side
 from parameterize.surface.geometry import normals_and_areas
 from parameterize.surface.surface import Surface
 from solve.forms.conditions import Condition
@@ -37,14 +37,13 @@ def draw_conditions(path: str | Path | None, body: BodyLike, conditions: Sequenc
     """
     palette, rows = _palette(len(conditions)), np.linspace(0.0, 1.0, SAMPLES)
     patches = []
-    several = as_body(body)
-    faces = [(i, name) for i, names in enumerate(several.outer) for name in names]
+    glued = as_body(body)
+    faces = [(i, name) for i, names in enumerate(glued.outer) for name in names]
     for number, name in faces:
-        x, normal = face_geometry(several.patches[number], [rows] * 3, *axis_side(name))
+        x, normal = face_geometry(glued.patches[number], [rows] * 3, *axis_side(name))
         points = np.asarray(x)
-        own = face_label(number, name) if isinstance(body, Body) else name
         units = normal / np.linalg.norm(normal, axis=0)
-        first = _first([condition.region for condition in conditions], points, units, own)
+        first = _first([condition.region for condition in conditions], points, units, glued.face_name(number, name))
         patches.append(Patch(np.moveaxis(points, 0, -1), palette[first], every=SAMPLES - 1))
     names = [f"{condition.kind}: {condition.region}" for condition in conditions]
     return _draw(path, patches, palette, names, "Where data are given")

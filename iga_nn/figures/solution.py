@@ -8,15 +8,15 @@ from typing import Any
 from matplotlib.figure import Figure
 
 from parameterize.arrays import Array
-from parameterize.spline.body import Body, BodyLike
+from parameterize.spline.body import BodyLike, as_body
 from solve import Solution
+from solve.field import FieldOnBody
 from solve.forms.boundary_value_problem import BoundaryValueProblem
-from solve.solution import MultiPatchSolution
 
 from ..level_table import EXACT_ERRORS, TITLES
 from ..options import NO_UNITS, Units
 from .cutaway import cut_of, visible
-from .evaluate import Solved, outer_faces
+from .evaluate import outer_faces
 from .fields import STRESS, Field, Samples, diagonal_of, error_of, fields_of, points_of, solution_of, vectors_of
 from .inside import show_inside
 from .ranges import with_unit
@@ -28,7 +28,7 @@ from .warp import in_words, warp_of
 def draw_error(
     path: str | Path | None,
     body: BodyLike,
-    solution: Solution | MultiPatchSolution,
+    solution: Solution,
     problem: BoundaryValueProblem,
     units: Units = NO_UNITS,
 ) -> Figure:
@@ -43,11 +43,11 @@ def draw_error(
     _write_numbers(rows[0][2], solution)
     show_inside(rows[1], body, points, patches)
     color_bar(figure, rows, field.limits, with_unit(r"$|u - u_h|$", units.displacement))
-    where = "inside" if isinstance(body, Body) else "on the mid-sections"
+    where = "on the mid-sections" if as_body(body).is_single else "inside"
     return save(figure, path, f"Error on the boundary and {where}")
 
 
-def draw_solution(path: str | Path | None, body: BodyLike, solution: Solved, units: Units = NO_UNITS) -> Figure:
+def draw_solution(path: str | Path | None, body: BodyLike, solution: FieldOnBody, units: Units = NO_UNITS) -> Figure:
     """Draw u_h on the boundary, in the body cut open and inside (`show_inside`); of an elastic body, the stress.
 
     An elastic body is drawn as its displacements deform it, enlarged by a factor that the title states.
@@ -66,7 +66,7 @@ def draw_solution(path: str | Path | None, body: BodyLike, solution: Solved, uni
 def draw_values(
     path: str | Path | None,
     body: BodyLike,
-    solution: Solved,
+    solution: FieldOnBody,
     title: str,
     *,
     exaggerate: float | None = None,
@@ -80,7 +80,7 @@ def draw_values(
     return _draw_values(path, body, moved, solution_of(solution), title)
 
 
-def moved_by(points: Samples, solution: Solved, factor: float) -> list[Array]:
+def moved_by(points: Samples, solution: FieldOnBody, factor: float) -> list[Array]:
     """Return the patches of points, displaced by a factor times the solution."""
     return [where + factor * by for where, by in zip(points.patches, vectors_of(solution).patches, strict=True)]
 
@@ -116,17 +116,17 @@ def _colored(points: Sequence[Array], field: Field) -> list[Patch]:
     ]
 
 
-def plot_solution(solution: Solution | MultiPatchSolution, what: str, file: str | Path | None) -> Figure:
+def plot_solution(solution: Solution, what: str, file: str | Path | None) -> Figure:
     """Return the values of a solution, or its error, on the boundary and inside."""
     check_drawable(what, ("values", "error"))
     if what == "error":
         if solution.problem.exact is None:
             raise ValueError("the error is not known: the problem has no exact solution; plot 'values'")
-        return draw_error(file, solution.geometry, solution, solution.problem)
-    return draw_solution(file, solution.geometry, solution)
+        return draw_error(file, solution.body, solution, solution.problem)
+    return draw_solution(file, solution.body, solution)
 
 
-def _write_numbers(panel: Any, solution: Solution | MultiPatchSolution) -> None:
+def _write_numbers(panel: Any, solution: Solution) -> None:
     report = solution.report
     errors = [(TITLES[key], getattr(report, key)) for key in EXACT_ERRORS]
     lines = [f"{report.dofs:,} unknowns"]

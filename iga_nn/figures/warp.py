@@ -4,7 +4,8 @@ import math
 
 import numpy as np
 
-from .evaluate import Solved
+from solve.field import FieldOnBody
+
 from .fields import is_spatial, quantities_of, solution_of
 from .ranges import SMALLEST
 
@@ -12,13 +13,13 @@ SHARE = 0.08  # of the diagonal of the body's box: the largest displacement as d
 DIGITS = (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0)  # first digits of a factor; each is at most 1.5 times the one before
 
 
-def is_displacement(solution: Solved) -> bool:
+def is_displacement(solution: FieldOnBody) -> bool:
     """Return whether a solution is a vector of three components whose law gives von Mises' stress, or is not known."""
     quantities = quantities_of(solution)
     return is_spatial(solution) and (quantities is None or "von_mises" in quantities)
 
 
-def warp_of(solution: Solved, size: float) -> float:
+def warp_of(solution: FieldOnBody, size: float) -> float:
     """Return the factor at which the largest displacement is drawn as 5 to 8 % of a size, 0 for no displacement.
 
     size: the diagonal of the body's box.

@@ -22,11 +22,10 @@ from parameterize.spline.body import TOLERANCE, Body, BodyLike, as_body, shared_
 from parameterize.spline.volume import BSplineVolume
 from parameterize.surface.readers.file import FORMATS as SURFACES
 from solve.discretization.space import TrialSpace, longest_edge
-from solve.field import MultiPatchField, SplineField
+from solve.field import BodyField, SplineField
 from solve.forms.boundary_value_problem import BoundaryValueProblem
 
 from ..errors import InputError, did_you_mean, input_errors
-from ..figures.evaluate import Solved, fields_on
 from ..new_file import check_new
 from ..options import PROBLEMS
 from ..report import document as reports
@@ -134,21 +133,15 @@ def load_volume(path: str | Path, tolerance: float = TOLERANCE) -> BodyLike:
         kind = kind_of(source) if source.is_file() else "npz"
         if kind is None and source.suffix != ".npz":
             raise InputError(f"{source}: is not a spline volume; create one with `iga-nn run poisson {source}`")
-        body = read_body(source, kind, tolerance) if kind in READERS else _load_archive(source)
-    if isinstance(body, Body) and (near := body.nearly_glued):
+        body = read_body(source, kind, tolerance) if kind in READERS else Body.load(source)
+    if near := body.nearly_glued:
         pairs = ", ".join(f"{pair} ({distance:.2g} apart)" for pair, distance in near[:SHOWN])
         more = f" and {len(near) - SHOWN} more" if len(near) > SHOWN else ""
         log.warning("%s: faces that nearly match are not glued: %s%s; a larger tolerance glues them", path, pairs, more)
-    rows = [row for patch in as_body(body) for row in patch.knots]
+    rows = [row for patch in body for row in patch.knots]
     if min(float(np.diff(np.unique(row)).min()) for row in rows) < NARROWEST:
         raise InputError(f"{path}: has a knot span narrower than {NARROWEST:g}: derivatives there overflow; widen it")
-    return body
-
-
-def _load_archive(path: Path) -> BodyLike:
-    """Return what a volume.npz holds, a body where it has interfaces."""
-    body = Body.load(path)
-    return body if len(body) > 1 or body.interfaces else body.patches[0]
+    return body.simplest
 
 
 def export(
@@ -214,7 +207,7 @@ def export(
         if file.exists() and not force:
             raise InputError(f"{file}: exists; --force replaces it, --out names another file")
     loaded = load_volume(volume)
-    if solution is not None and to == "mfem" and isinstance(loaded, Body):
+    if solution is not None and to == "mfem" and not as_body(loaded).is_single:
         raise InputError(f"{volume}: has several patches; a solution on these goes to vtk, view, gismo or json")
     field, problem = (None, None) if solution is None else _load_solution(Path(solution), loaded)
     try:
@@ -228,23 +221,15 @@ def export(
     return target
 
 
-def load_field(path: Path, body: BodyLike) -> Solved:
-    """Return the field of solution.npz on a body of one patch or several.
-
-    Raises ValueError or OSError for a file that holds none for so many.
-    """
-    return MultiPatchField.load(path) if isinstance(body, Body) else SplineField.load(path)
-
-
-def _load_solution(path: Path, body: BodyLike) -> tuple[Solved, BoundaryValueProblem | None]:
+def _load_solution(path: Path, body: BodyLike) -> tuple[BodyField, BoundaryValueProblem | None]:
     """Return a solution and the problem in the report beside it, None for a problem that is not known.
 
     Raises InputError where the solution does not belong to the body: by its knots, or by the h of its report.
     """
     several = as_body(body)
     with input_errors():
-        found = load_field(path, body)
-    fields = fields_on(found)
+        found = BodyField.load(path)
+    fields = found.patches
     if any(field.coefficients.shape[3:] not in ((), (3,)) for field in fields):
         raise InputError(f"{path}: coefficients must have shape (m_u, m_v, m_w) or (.., 3)")
     if len(fields) != len(several) or not all(map(_is_refined, several, fields)):

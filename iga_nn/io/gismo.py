@@ -18,7 +18,7 @@ from parameterize.arrays import Array
 from parameterize.spline.body import Body, BodyLike, as_body
 from parameterize.spline.interface import Face, Interface, axis_side, varying
 from parameterize.spline.volume import FACE_NAMES, BSplineVolume
-from solve.field import MultiPatchField, SplineField
+from solve.field import FieldOnBody, SplineField
 
 from .patches import as_text, fastest_first, patch_of
 from .words import finite_numbers
@@ -175,10 +175,10 @@ def write_gismo(path: Path, spline: BodyLike, *_: object) -> None:
     _save(path, root)
 
 
-def write_gismo_field(path: Path, solution: SplineField | MultiPatchField, spline: BodyLike) -> None:
+def write_gismo_field(path: Path, solution: FieldOnBody, spline: BodyLike) -> None:
     """Write a solution on a body as G+Smo XML."""
     root = _with_topology(as_body(spline))
-    for number, field in enumerate(solution.patches if isinstance(solution, MultiPatchField) else [solution]):
+    for number, field in enumerate(solution.patches):
         _add_patch(root, number, field, field.coefficients, None)
     _save(path, root)
 

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from parameterize.arrays import Array
-from parameterize.spline.body import FLAT, TOLERANCE, Body, BodyLike, net_area
+from parameterize.spline.body import FLAT, TOLERANCE, Body, net_area
 from parameterize.spline.interface import Face, face_label, face_layer, gap, orientations
 from parameterize.spline.volume import LARGEST, BSplineVolume
 
@@ -66,8 +66,8 @@ def as_text(rows: Array) -> str:
 
 def body_of(
     patches: Sequence[BSplineVolume], declared: Iterable[tuple[Face, Face]] = (), tolerance: float = TOLERANCE
-) -> BodyLike:
-    """Return one volume, or the patches with the interfaces that their control points show.
+) -> Body:
+    """Return the body of patches with the interfaces that their control points show.
 
     declared: pairs of faces that the file says are glued. tolerance: as in `Body.from_patches`. Raises ValueError
     where the two faces of a pair are apart, and where the patches do not fit together. Interfaces that the file does
@@ -77,7 +77,7 @@ def body_of(
         raise ValueError("holds no patch")
     body = Body.from_patches(patches, tolerance)
     _compare(body, [frozenset(pair) for pair in declared])
-    return body if len(body) > 1 or body.interfaces else body.patches[0]
+    return body
 
 
 def _compare(body: Body, declared: Sequence[frozenset[Face]]) -> None:

@@ -5,7 +5,7 @@ import zlib
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
-from parameterize.spline.body import BodyLike
+from parameterize.spline.body import Body
 from parameterize.spline.interface import Face
 from parameterize.spline.volume import BSplineVolume
 
@@ -52,8 +52,8 @@ def _unpacked(packed: bytes) -> bytes:
         return b""
 
 
-def read_body(path: Path, kind: str, tolerance: float) -> BodyLike:
-    """Return the volume of a file of one patch, the body of several patches with their interfaces.
+def read_body(path: Path, kind: str, tolerance: float) -> Body:
+    """Return the body of a file, of several patches with their interfaces.
 
     kind: one of READERS. tolerance: as in `Body.from_patches`. Raises OSError, and ValueError where the file is
     damaged, or its patches do not fit together.

@@ -7,7 +7,7 @@ a spline of one coordinate, or of three for displacements (`dim`).
 
 import json
 import logging
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -17,7 +17,7 @@ import numpy as np
 from parameterize.spline.body import Body, BodyLike, as_body
 from parameterize.spline.interface import Face, Interface
 from parameterize.spline.volume import FACE_NAMES, BSplineVolume
-from solve.field import MultiPatchField, SplineField
+from solve.field import FieldOnBody, SplineField
 
 from ..errors import InputError, one_line
 from .patches import fastest_first, patch_of
@@ -66,13 +66,9 @@ def _named(number: int, spline: Any) -> BSplineVolume:
         raise ValueError(f"spline {number}: {error}") from None
 
 
-def write_json(path: Path, spline: BodyLike | SplineField | MultiPatchField, *_: object) -> None:
+def write_json(path: Path, spline: BodyLike | FieldOnBody, *_: object) -> None:
     """Write a volume, a body or a solution as splinepy's JSON, which has no place for more."""
-    shown: Sequence[BSplineVolume | SplineField]
-    if isinstance(spline, SplineField | MultiPatchField):
-        shown = spline.patches if isinstance(spline, MultiPatchField) else [spline]
-    else:
-        shown = as_body(spline).patches
+    shown = spline.patches if isinstance(spline, FieldOnBody) else as_body(spline).patches
     _splinepy().io.json.export(str(path), [to_splinepy(one) for one in shown])
 
 

@@ -19,18 +19,18 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from parameterize.arrays import Array
-from parameterize.spline.body import Body, BodyLike, as_body
+from parameterize.spline.body import BodyLike, as_body
 from parameterize.spline.bspline import divided_spans
 from parameterize.spline.orientation import orientation
 from parameterize.spline.volume import BSplineVolume
-from solve.field import Points, SplineField
+from solve.field import FieldOnBody, Points, SplineField
 from solve.forms.boundary_value_problem import BoundaryValueProblem
 from solve.forms.form import Quantity
 from solve.quantities import on_grid
-from solve.solution import MultiPatchSolution, Solution
+from solve.solution import Solution
 
 from ..errors import InputError, one_line
-from ..figures.evaluate import Grid, Solved, arap_of, error_at, fields_on, problems_on
+from ..figures.evaluate import Grid, arap_of, error_at, problems_on
 from .vtk import bezier_cells, breaks_of, save
 
 if TYPE_CHECKING:
@@ -50,7 +50,7 @@ TENSOR = {"XX": (0, 0), "YY": (1, 1), "ZZ": (2, 2), "XY": (0, 1), "YZ": (1, 2), 
 def write_view(
     path: Path,
     body: BodyLike,
-    solution: Solved | None = None,
+    solution: FieldOnBody | None = None,
     problem: BoundaryValueProblem | None = None,
     samples: int | None = None,
     quantities: Quantities | None = None,
@@ -69,11 +69,11 @@ def write_view(
     save(path, _joined(body, grids))
 
 
-def write_solution(path: Path, solution: Solution | MultiPatchSolution) -> int:
+def write_solution(path: Path, solution: Solution) -> int:
     """Write a solution and the quantities of its law in single precision, and return how many spans a cell takes a
     direction: more than one where the file would be large.
     """
-    parts = _parts(solution.geometry, solution, solution.problem)
+    parts = _parts(solution.body, solution, solution.problem)
     grids, most = [], 1
     for part in parts:
         rows, spans = _fitting(breaks_of(part.volume, part.solution), MOST_KEPT // len(parts))
@@ -82,13 +82,13 @@ def write_solution(path: Path, solution: Solution | MultiPatchSolution) -> int:
         grid.points = grid.points.astype(np.float32)
         grids.append(grid)
         most = max(most, spans)
-    save(path, _joined(solution.geometry, grids))
+    save(path, _joined(solution.body, grids))
     return most
 
 
 def grid(
     body: BodyLike,
-    solution: Solved | None = None,
+    solution: FieldOnBody | None = None,
     problem: BoundaryValueProblem | None = None,
     samples: int | None = None,
     quantities: Quantities | None = None,
@@ -123,16 +123,16 @@ class _Part:
     problem: BoundaryValueProblem | None
 
 
-def _parts(body: BodyLike, solution: Solved | None, problem: BoundaryValueProblem | None) -> list[_Part]:
+def _parts(body: BodyLike, solution: FieldOnBody | None, problem: BoundaryValueProblem | None) -> list[_Part]:
     volumes = as_body(body).patches
-    fields = [None] * len(volumes) if solution is None else fields_on(solution)
+    fields = [None] * len(volumes) if solution is None else solution.patches
     problems = [None] * len(volumes) if problem is None else problems_on(problem, body)
     return [_Part(*part) for part in zip(volumes, arap_of(body), fields, problems, strict=True)]
 
 
 def _joined(body: BodyLike, grids: Sequence[pyvista.UnstructuredGrid]) -> pyvista.UnstructuredGrid:
     """Return the grids of all patches as one, with the number of each cell's patch."""
-    if not isinstance(body, Body):
+    if as_body(body).is_single:
         return grids[0]
     import pyvista
 

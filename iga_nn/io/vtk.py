@@ -29,7 +29,7 @@ from scipy.sparse import csr_array
 
 from parameterize.arrays import Array, IntArray
 from parameterize.spline.bernstein import elevation, extraction
-from parameterize.spline.body import Body, BodyLike, as_body, shared_numbers
+from parameterize.spline.body import BodyLike, as_body, shared_numbers
 from parameterize.spline.bspline import (
     apply_along,
     evaluate_grid,
@@ -42,7 +42,7 @@ from parameterize.spline.interface import WEIGHT_TOLERANCE, Interface, face_laye
 from parameterize.spline.orientation import orientation
 from parameterize.spline.rational import projected
 from parameterize.spline.volume import BSplineVolume
-from solve.field import MultiPatchField, SplineField
+from solve.field import FieldOnBody, SplineField
 
 if TYPE_CHECKING:
     import pyvista
@@ -53,22 +53,23 @@ BEZIER_HEXAHEDRON = 79
 def write_bezier(
     path: Path,
     body: BodyLike,
-    solution: SplineField | MultiPatchField | None = None,
+    solution: FieldOnBody | None = None,
     *_: object,
 ) -> None:
     """Write the exact cells; a solution becomes the point data `u`."""
     save(path, bezier_cells(body, solution))
 
 
-def bezier_cells(body: BodyLike, solution: SplineField | MultiPatchField | None) -> pyvista.UnstructuredGrid:
+def bezier_cells(body: BodyLike, solution: FieldOnBody | None) -> pyvista.UnstructuredGrid:
     """Return the cells of all patches; of several also the number of each cell's patch as the cell data `patch`.
 
     Neighbours share the points of their interface where these have the same weights, so that the surface of the grid is
     that of the body. Where the weights of two faces differ by a factor, each patch keeps points of its own.
     """
-    fields = solution.patches if isinstance(solution, MultiPatchField) else (solution,) * len(as_body(body))
-    grids = [exact_cells(patch, field) for patch, field in zip(as_body(body), fields, strict=True)]
-    if not isinstance(body, Body):
+    body = as_body(body)
+    fields = (None,) * len(body) if solution is None else solution.patches
+    grids = [exact_cells(patch, field) for patch, field in zip(body, fields, strict=True)]
+    if body.is_single:
         return grids[0]
     degrees = [grid.cell_data["HigherOrderDegrees"][0].astype(int).tolist() for grid in grids]
     spans = [[len(row) - 1 for row in breaks_of(*pair)] for pair in zip(body, fields, strict=True)]

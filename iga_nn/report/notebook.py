@@ -15,7 +15,7 @@ from parameterize.spline.body import Body, all_control_points
 from parameterize.spline.bspline import breakpoints
 from parameterize.spline.volume import BSplineVolume
 from parameterize.surface.surface import Surface
-from solve.solution import MultiPatchSolution, Solution
+from solve.solution import Solution
 from solve.study import Convergence
 
 from ..level_table import as_rows
@@ -119,9 +119,8 @@ def _patches(patches: Sequence[BoxDistortion]) -> str:
     return _table("Patches, as given", rows, head) if rows else ""
 
 
-@as_html.register(Solution)
-@as_html.register(MultiPatchSolution)
-def _solution(solution: Solution | MultiPatchSolution) -> str:
+@as_html.register
+def _solution(solution: Solution) -> str:
     report = solution.report
     head, *rows = as_rows([report.as_dict()])
     title = "Solution" if report.converged else f"Solution, NOT CONVERGED (residual {report.residual:.1e})"

@@ -19,16 +19,16 @@ from matplotlib import colormaps
 from numpy.typing import NDArray
 
 from parameterize.arrays import Array, Knots, Mask
-from parameterize.spline.body import Body, BodyLike, as_body
+from parameterize.spline.body import BodyLike, as_body
 from parameterize.spline.bspline import breakpoints
-from parameterize.spline.interface import face_label
 from parameterize.spline.volume import AXES, FACE_NAMES
+from solve.field import FieldOnBody
 from solve.forms.boundary_value_problem import BoundaryValueProblem
 from solve.forms.form import Quantity
 
 from ..figures import evaluate
 from ..figures.cutaway import cut_of, patches_of, seen_quarters
-from ..figures.evaluate import PER_PATCH, Solved, fields_on, outer_faces
+from ..figures.evaluate import PER_PATCH, outer_faces
 from ..figures.fields import (
     MANY,
     STRESS,
@@ -72,7 +72,7 @@ class Frame:
     knots: Sequence[Knots] | None = None
 
     @classmethod
-    def of(cls, label: str, solution: Solved, quantities: Mapping[str, Quantity] | None = None) -> Self:
+    def of(cls, label: str, solution: FieldOnBody, quantities: Mapping[str, Quantity] | None = None) -> Self:
         """Return the frame of a solution on its body.
 
         quantities: further fields by their names, functions of u (c, ...), grad (c, 3, ...) and x (3, ...) that return
@@ -90,13 +90,13 @@ class Frame:
         named = [quantity_of(solution, quantity, name, name) for name, quantity in (quantities or {}).items()]
         fields = [field for field in named if field is not None] + fields_of(solution)
         vectors = vectors_of(solution) if is_spatial(solution) else None
-        knots = [field.knots for field in fields_on(solution)]
+        knots = [field.knots for field in solution.patches]
         return cls(label, fields, vectors, is_displacement(solution), knots)
 
 
 def scene_of(
     body: BodyLike,
-    solution: Solved | None = None,
+    solution: FieldOnBody | None = None,
     problem: BoundaryValueProblem | None = None,
     *,
     units: Units = NO_UNITS,
@@ -106,7 +106,7 @@ def scene_of(
 
     units: the units in the titles of the bars. coarser: 1 for all points, 2 for every second point.
     """
-    if solution is None or not all(np.all(np.isfinite(field.coefficients)) for field in fields_on(solution)):
+    if solution is None or not all(np.all(np.isfinite(field.coefficients)) for field in solution.patches):
         return _scene(body, [Frame("", [])], coarser)
     frame = Frame.of("", solution)
     if problem is not None and problem.exact is not None:
@@ -206,7 +206,7 @@ def _scene(body: BodyLike, frames: Sequence[Frame], coarser: int) -> Scene:
         "outer": [divmod(k, PER_PATCH) for k in drawn.faces],  # patch and face
         "cut": _cut(list(seen_quarters(body, left_out)), drawn.faces),
         "places": drawn.packed(points, lambda where: (where - low) / np.where(high > low, high - low, 1.0)),
-        "axes": [] if isinstance(body, Body) else list(AXES),  # along which there are sections through the cube
+        "axes": list(AXES) if as_body(body).is_single else [],  # along which there are sections through the cube
         "spans": [[breakpoints(row).tolist() for row in rows] for rows in knots],
         **_colors(body, drawn.faces),
         "map": _packed(colormaps[evaluate.MAP](np.arange(256))[:, :3], np.uint8),  # (256, 3)
@@ -239,8 +239,9 @@ def _bits(quarters: Mask) -> int:
 def _colors(body: BodyLike, outer: Sequence[int]) -> dict[str, Any]:
     """Return the colours and the names of the outer faces, and the legend of the colours."""
     colors, labels = np.reshape(face_colors(body), (-1, len(FACE_NAMES))), evaluate.face_labels()
-    if isinstance(body, Body):
-        labels = [face_label(i, name) for i in range(len(body)) for name in FACE_NAMES]
+    glued = as_body(body)
+    if not glued.is_single:
+        labels = [glued.face_name(i, name) for i in range(len(glued)) for name in FACE_NAMES]
     named = np.reshape(labels, (-1, len(FACE_NAMES)))
     return {
         "colors": [str(colors[divmod(k, PER_PATCH)]) for k in outer],

@@ -7,13 +7,13 @@ from pathlib import Path
 from typing import Any
 
 from parameterize.checkpoint import Checkpoints
-from parameterize.spline.body import Body, BodyLike, as_body
+from parameterize.spline.body import BodyLike, as_body
 from solve import SolveReport
 from solve.discretization.errors import Errors
-from solve.field import MultiPatchField, SplineField
+from solve.field import BodyField
 from solve.forms.boundary_value_problem import BoundaryValueProblem
 from solve.reactions import Balance
-from solve.solution import MultiPatchSolution, Solution
+from solve.solution import Solution
 
 from ..figures.evaluate import problems_on
 from ..options import ProblemOptions
@@ -21,8 +21,6 @@ from ..report import document as reports
 from .output_folder import digest
 
 log = logging.getLogger(__name__)
-
-Found = Solution | MultiPatchSolution
 
 SOLUTION = "solution.npz"
 _CHECKPOINT = "solve"
@@ -39,9 +37,9 @@ class Levels:
     refine: list[int] = field(default_factory=list)
     entries: list[dict[str, Any]] = field(default_factory=list)
     reports: list[SolveReport] = field(default_factory=list)
-    finest: Found | None = None
+    finest: Solution | None = None
 
-    def add(self, refine: int, entry: dict[str, Any], solution: Found) -> None:
+    def add(self, refine: int, entry: dict[str, Any], solution: Solution) -> None:
         """Add a level with its entry of report.json and its solution."""
         self.refine.append(refine)
         self.entries.append(entry)
@@ -117,14 +115,8 @@ def _report(values: dict[str, Any]) -> SolveReport:
     return SolveReport(**given)
 
 
-def _loaded(path: Path, body: BodyLike, report: SolveReport, problem: BoundaryValueProblem) -> Found:
+def _loaded(path: Path, body: BodyLike, report: SolveReport, problem: BoundaryValueProblem) -> Solution:
     """Return the solution of a file on its body."""
-    fields = MultiPatchField.load(path).patches if isinstance(body, Body) else (SplineField.load(path),)
-    parts = zip(fields, as_body(body).patches, problems_on(problem, body), strict=True)
-    patches = tuple(
-        Solution(one.degrees, one.knots, one.coefficients, patch, report=report, problem=own)
-        for one, patch, own in parts
-    )
-    if isinstance(body, Body):
-        return MultiPatchSolution(patches, body, report, problem.on(body))
-    return patches[0]
+    glued = as_body(body)
+    field = BodyField(BodyField.load(path).patches, glued)
+    return Solution.of(field, problems_on(problem, glued), report, problem.on(glued))

@@ -17,7 +17,7 @@ from parameterize.checkpoint import differing
 from parameterize.compilation import compilation_told
 from parameterize.files import array_names, load_arrays, save_arrays
 from parameterize.progress import ProgressCallback
-from parameterize.spline.body import Body, BodyLike, as_body
+from parameterize.spline.body import BodyLike, as_body
 from parameterize.spline.volume import FACE_NAMES
 from parameterize.surface.geometry import vertex_normals
 from parameterize.surface.surface import Surface
@@ -336,7 +336,7 @@ def _write(
 
 def _draw(state: RunFolder, given: MapInput, body: BodyLike, history: dict[str, Any]) -> None:
     """Draw the map, its blocks, and the course of the training: beside the run they are done before the solve is."""
-    known: dict[str, Any] = {"blocks": body} if isinstance(body, Body) else {}
+    known: dict[str, Any] = {} if as_body(body).is_single else {"blocks": body}
     if len(next(iter(history.values()))):  # exact blocks have no steps
         known["history"] = history
     state.draw("map", volume=body, marks=given.marks, **known)

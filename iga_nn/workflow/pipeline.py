@@ -20,7 +20,7 @@ from parameterize.progress import ProgressCallback
 from parameterize.spline.body import BodyLike, as_body
 from parameterize.spline.volume import BSplineVolume
 from parameterize.threads import default_threads
-from solve import ConvergenceRow, check_device, check_problem, convergence, modes
+from solve import ConvergenceRow, Solution, check_device, check_problem, convergence, modes
 from solve.discretization.slab import agreed
 from solve.forms.boundary_value_problem import BoundaryValueProblem
 from solve.study import with_rates
@@ -44,7 +44,7 @@ from ..report import html
 from ..type_check import check_type
 from .command_line import command_line
 from .cost_estimate import tell_memory
-from .levels import Found, KeptLevels
+from .levels import KeptLevels
 from .mapping import MapInput, kept_map, map_surface, read_input
 from .output_folder import CHECKPOINT, Outcome, RunFolder, changed_file, default_folder, open_folder
 from .painter import Painter
@@ -395,7 +395,7 @@ def _finished_by(
 def _finish(
     state: RunFolder,
     body: BodyLike,
-    solution: Found | None = None,
+    solution: Solution | None = None,
     problem: BoundaryValueProblem | None = None,
     units: Units = NO_UNITS,
     scene: Any = None,

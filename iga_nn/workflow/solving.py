@@ -10,17 +10,16 @@ from typing import Any
 import numpy as np
 
 from parameterize.spline.body import BodyLike
-from solve import ConvergenceError, ConvergenceRow, Modes, SolveOptions, SolveReport, rates, solve_with
+from solve import ConvergenceError, ConvergenceRow, Modes, Solution, SolveOptions, SolveReport, rates, solve_with
 from solve.forms.boundary_value_problem import BoundaryValueProblem
 from solve.forms.frame import UnitFrame
 
 from ..errors import InputError, input_errors, one_line
-from ..figures.evaluate import fields_on
 from ..options import NO_UNITS, ProblemOptions, Units
 from ..report import document as reports
 from ..report import html
 from ..report.extremes import growth_notices
-from .levels import SOLUTION, Found, KeptLevels, Levels
+from .levels import SOLUTION, KeptLevels, Levels
 from .output_folder import RunFolder
 
 log = logging.getLogger(__name__)
@@ -35,7 +34,7 @@ def solve_levels(
     statement: ProblemOptions,
     options: SolveOptions,
     kept: KeptLevels | None = None,
-) -> Found:
+) -> Solution:
     """Solve level after level, write the report of all levels, and return the finest solution.
 
     Each level is in report.json, and its solution in solution.npz, as soon as it is done. Where a later one is
@@ -89,7 +88,7 @@ def _growth(statement: ProblemOptions, problem: BoundaryValueProblem, done: Leve
 
 def _show(
     state: RunFolder, body: BodyLike, done: Levels, problem: BoundaryValueProblem, statement: ProblemOptions
-) -> tuple[Found, BoundaryValueProblem, Units]:
+) -> tuple[Solution, BoundaryValueProblem, Units]:
     """Draw the finest solution, write it for ParaView, and return what its view takes."""
     assert done.finest is not None
     _draw(state, body, done, problem, statement.units)
@@ -99,7 +98,7 @@ def _show(
     return done.finest, problem, statement.units
 
 
-def level_of(solution: Found) -> dict[str, Any]:
+def level_of(solution: Solution) -> dict[str, Any]:
     """Return a level of report.json: the report of its solve and the extremes, where the solution has finite ones."""
     level, extremes = solution.report.as_dict(), {}
     started = time.process_time()
@@ -113,7 +112,7 @@ def level_of(solution: Found) -> dict[str, Any]:
 
 def each_level(
     body: BodyLike, problem: BoundaryValueProblem, levels: Sequence[int], options: SolveOptions
-) -> Iterator[Found]:
+) -> Iterator[Solution]:
     """Solve level after level and yield the solutions; the solve of a scalar problem starts at the last solution.
 
     All processes of an MPI job call this together.
@@ -161,7 +160,7 @@ def verdict_of(state: RunFolder) -> str:
     return str(state.report["parameterization"]["bijective"])
 
 
-def _write_cells(state: RunFolder, solution: Found) -> None:
+def _write_cells(state: RunFolder, solution: Solution) -> None:
     """Write solution.vtu, where the solution is finite; a failure does not end the run."""
     if not is_finite(solution):
         return
@@ -174,9 +173,9 @@ def _write_cells(state: RunFolder, solution: Found) -> None:
             log.info("solution.vtu: a cell stands for %d x %d x %d elements; %s", spans, spans, spans, every)
 
 
-def is_finite(solution: Found) -> bool:
+def is_finite(solution: Solution) -> bool:
     """Return whether all coefficients of a solution are finite; they are not after a failure of the solver."""
-    return all(bool(np.all(np.isfinite(field.coefficients))) for field in fields_on(solution))
+    return all(bool(np.all(np.isfinite(field.coefficients))) for field in solution.patches)
 
 
 def _draw(state: RunFolder, body: BodyLike, done: Levels, problem: BoundaryValueProblem, units: Units) -> None:
@@ -192,7 +191,7 @@ def _draw(state: RunFolder, body: BodyLike, done: Levels, problem: BoundaryValue
         known["problem"] = problem
         if len(done.reports) > 1:
             rows = [ConvergenceRow(report, None, None) for report in done.reports]
-            known["levels"] = {max(max(field.degrees) for field in fields_on(done.finest)): rows}
+            known["levels"] = {max(max(field.degrees) for field in done.finest.patches): rows}
     if problem.conditions:
         known["conditions"] = (problem.placed(UnitFrame.of(body)) if problem.is_scaled else problem).conditions
     state.draw("solution", **known)
@@ -225,7 +224,7 @@ def notices_of(found: Iterable[SolveReport]) -> list[str]:
 def scene_of(
     state: RunFolder,
     body: BodyLike,
-    solution: Found | None = None,
+    solution: Solution | None = None,
     problem: BoundaryValueProblem | None = None,
     units: Units = NO_UNITS,
 ) -> Any:

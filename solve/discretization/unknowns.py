@@ -35,6 +35,9 @@ class Unknowns(Protocol):
     def collect(self, integrals: Sequence[Array]) -> Array:
         """Return the vector (c, ...) of integrals (c, n_u, n_v, n_w) over each patch, copies of an unknown added."""
 
+    def assembled(self, integrals: Sequence[Array]) -> Array:
+        """Return the integrals (c, ...) of all coefficients, fixed ones included, copies of a coefficient added."""
+
     def chosen(self, coefficients: Sequence[Array]) -> Array:
         """Return the vector (c, ...) of the coefficients (c, n_u, n_v, n_w) of a function on each patch."""
 
@@ -77,6 +80,12 @@ class Window:
         self.space.add(result)
         return np.ascontiguousarray(result[..., *self.space.window])
 
+    def assembled(self, integrals: Sequence[Array]) -> Array:
+        """Return the integrals (c, n_u, n_v, n_w), with the parts of other processes."""
+        (result,) = integrals
+        self.space.add(result)
+        return result
+
     def chosen(self, coefficients: Sequence[Array]) -> Array:
         """Return the vector (c, m_u, m_v, m_w) of the coefficients of a function."""
         (full,) = coefficients
@@ -88,9 +97,7 @@ class Window:
 
     def on_fixed(self, integrals: Sequence[Array]) -> list[Array]:
         """Return the integrals, with the parts of other processes."""
-        (result,) = integrals
-        self.space.add(result)
-        return [result]
+        return [self.assembled(integrals)]
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,6 +145,10 @@ class Glued:
         """Return the vector (c, m) of integrals (c, n_u, n_v, n_w) over each patch, copies added."""
         return np.ascontiguousarray(self._sums(integrals, self.places, self.shape[0] + 1)[:, :-1])
 
+    def assembled(self, integrals: Sequence[Array]) -> Array:
+        """Return the integrals (c, count) of all coefficients, copies added."""
+        return self._sums(integrals, self.numbers, self.count)
+
     def chosen(self, coefficients: Sequence[Array]) -> Array:
         """Return the vector (c, m) of the coefficients of a function that is continuous across interfaces."""
         padded = np.zeros((len(coefficients[0]), self.shape[0] + 1))
@@ -183,7 +194,7 @@ class Glued:
 
     def on_fixed(self, integrals: Sequence[Array]) -> list[Array]:
         """Return integrals of fixed coefficients, summed over all patches, in the first patch whose data fix them."""
-        total = self._sums(integrals, self.numbers, self.count)
+        total = self.assembled(integrals)
         return [total[:, own] * is_owned for own, is_owned in zip(self.numbers, self.owned, strict=True)]
 
 

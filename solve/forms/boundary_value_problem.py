@@ -10,10 +10,10 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from parameterize.arrays import Array
-from parameterize.spline.body import BodyLike
+from parameterize.spline.body import Body, BodyLike, as_body
 from parameterize.spline.volume import FACE_NAMES
 
-from ..field import MultiPatchField, SplineField
+from ..field import FieldOnBody
 from .conditions import Condition, Flux, OnFaces, Robin, Value, on_faces, on_regions
 from .data import ByPatch, Data, Datum, PerPatch, finite, parse_each
 from .form import Form, check_shapes, strong_form, strong_terms
@@ -152,7 +152,7 @@ class BoundaryValueProblem:
         The middle is that of the bounding box. Raises ValueError for a field of another volume.
         """
         for _, datum in self._datums:
-            if not all(entry.fits(body) for entry in datum.entries if isinstance(entry, SplineField | MultiPatchField)):
+            if not all(entry.fits(as_body(body)) for entry in datum.entries if isinstance(entry, FieldOnBody)):
                 raise ValueError(
                     f"{datum.name}: the field was found on another volume; give one of the volume that is solved on"
                 )
@@ -172,6 +172,10 @@ class BoundaryValueProblem:
     def places(self) -> list[tuple[str, str]]:
         """Return the kind and the region of each condition."""
         return [(condition.kind, condition.region.text) for condition in self._all]
+
+    def on_patches(self, body: Body) -> list[Self]:
+        """Return the problem of each patch of a body; of a single patch the problem itself."""
+        return [self] if body.is_single else [self.on_patch(i, faces) for i, faces in enumerate(body.outer)]
 
     def on_patch(self, patch: int, outer: Collection[str]) -> Self:
         """Return the problem of one patch of several, with data on the patch's outer faces alone.

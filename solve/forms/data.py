@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from parameterize.arrays import Array
 
-from ..field import MultiPatchField, SplineField
+from ..field import FieldOnBody
 from .frame import UnitFrame
 from .parser import Expression, ExpressionError
 
@@ -20,10 +20,10 @@ WORDS = {2: "two", 3: "three"}
 NOT_SMOOTH = "a function, a field or a choice (where, min, max), whose derivatives are unknown"
 USUAL_SIZE = 5.0  # of coordinates in which formulas are written
 
-Scalar = str | float | SplineField | MultiPatchField | Callable[..., ArrayLike]
+Scalar = str | float | FieldOnBody | Callable[..., ArrayLike]
 Data = Scalar | Sequence[Scalar]  # a sequence has one entry a component
 PerPatch = Data | Mapping[int, Data]  # a datum of the body, or one of each patch
-Entry = Expression | SplineField | MultiPatchField | Callable[[Array], ArrayLike]
+Entry = Expression | FieldOnBody | Callable[[Array], ArrayLike]
 
 
 @dataclass(frozen=True)
@@ -55,7 +55,7 @@ class Datum:
 
     def on_patch(self, patch: int) -> "Datum":
         """Return the datum on one patch of several, where fields are those of the patch."""
-        own = (entry.patches[patch] if isinstance(entry, MultiPatchField) else entry for entry in self.entries)
+        own = (entry.patches[patch] if isinstance(entry, FieldOnBody) else entry for entry in self.entries)
         return replace(self, entries=tuple(own))
 
     def __call__(self, x: Array) -> Array:
@@ -70,9 +70,7 @@ class Datum:
             if isinstance(entry, Expression):
                 found = entry(*np.asarray(x))
             else:
-                found = np.asarray(
-                    entry.at(x) if isinstance(entry, SplineField | MultiPatchField) else self._called(entry, x)
-                )
+                found = np.asarray(entry.at(x) if isinstance(entry, FieldOnBody) else self._called(entry, x))
                 if found.dtype.kind not in "iuf":
                     raise ValueError(f"{self.name} must return real numbers, got {found.dtype}")
             found = found[0] if found.shape == (1, *each) else found  # one component, written as (c, ...)
@@ -134,9 +132,9 @@ def parse(name: str, data: Data, components: int = 1, face: str = "", *, of_coor
         raise ValueError(f"{name} must have {count} entries, one a component, got {data!r}")
     for entry in entries:
         wanted = () if len(entries) == components else (components,)
-        if isinstance(entry, SplineField | MultiPatchField) and _shape(entry) != wanted:
+        if isinstance(entry, FieldOnBody) and _shape(entry) != wanted:
             raise ValueError(f"{name}: the field must have {components if wanted else 1} component(s) here")
-        if not isinstance(entry, str | MultiPatchField) and not callable(entry):
+        if not isinstance(entry, str) and not callable(entry):
             of = "x, y, z" if of_coordinates else "points x"
             raise ValueError(f"{name} must be a number, a formula, a function of {of} or a field, got {entry!r:.80}")
     try:
@@ -144,10 +142,7 @@ def parse(name: str, data: Data, components: int = 1, face: str = "", *, of_coor
     except ExpressionError as error:
         raise ExpressionError(f"{name}: {error}") from None
     if of_coordinates:
-        parsed = [
-            e if isinstance(e, Expression | SplineField | MultiPatchField) else partial(_of_coordinates, e)
-            for e in parsed
-        ]
+        parsed = [e if isinstance(e, Expression | FieldOnBody) else partial(_of_coordinates, e) for e in parsed]
     return Datum(name, tuple(parsed), components, face)
 
 
@@ -175,9 +170,9 @@ def parse_each(
     return ByPatch.of(name, each, face)
 
 
-def _shape(field: SplineField | MultiPatchField) -> tuple[int, ...]:
+def _shape(field: FieldOnBody) -> tuple[int, ...]:
     """Return the shape of a field's values: (), or (c,) with c components."""
-    return (field if isinstance(field, SplineField) else field.patches[0]).coefficients.shape[3:]
+    return field.patches[0].coefficients.shape[3:]
 
 
 def _of_coordinates(function: Callable[[Array, Array, Array], ArrayLike], x: Array) -> ArrayLike:

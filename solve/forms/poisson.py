@@ -10,7 +10,7 @@ import numpy as np
 
 from parameterize.arrays import Array
 
-from ..field import MultiPatchField, SplineField
+from ..field import FieldOnBody
 from .conditions import OF_SCALARS, Condition, GivenRegions, OnFaces
 from .data import NOT_SMOOTH, Data, Datum, PerPatch, demand, demand_definite, demand_size
 from .jets import PAIRS, SYMMETRIC, Jet
@@ -129,7 +129,7 @@ class Poisson(LawWithData):
         if "kappa" in self.data and not self.data["kappa"].is_formula:
             return f"kappa is {NOT_SMOOTH}"
         fields = [] if not self.has_reaction else self.data["reaction"].entries
-        return "reaction is a field" if any(isinstance(e, SplineField | MultiPatchField) for e in fields) else ""
+        return "reaction is a field" if any(isinstance(e, FieldOnBody) for e in fields) else ""
 
     def tensor(self, x: Array, component: int = 0) -> Array:
         """Return kappa (6, ...). Raises ExpressionError where it is not positive definite."""

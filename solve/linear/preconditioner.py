@@ -7,7 +7,7 @@ reaction and Robin's conditions are included.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -138,6 +138,12 @@ def fast_diagonalization(operator: Operator) -> FastDiagonalization:
             return found
         whole = replace(found, local=incomplete_cholesky(operator))
         return whole if whole.local is not None and _is_usable(whole) else replace(found, weakness=NO_FACTOR)
+
+
+def blocks_of(operators: Sequence[Operator]) -> tuple[FastDiagonalization | None, ...]:
+    """Return the preconditioner of each component of a patch; None for a patch without unknowns."""
+    has_unknowns = all(part.stop > part.start for part in operators[0].space.free)
+    return tuple(fast_diagonalization(operator) if has_unknowns else None for operator in operators)
 
 
 def _is_usable(preconditioner: FastDiagonalization) -> bool:
