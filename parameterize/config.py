@@ -14,6 +14,8 @@ from typing import Literal, get_args
 MAX_CONTROL_POINTS = 100  # per direction
 
 StageName = Literal["S(2)", "S(1)", "cube", "corners", "edges"]
+PresetName = Literal["fast", "grown", "paper"]
+Device = Literal["auto", "cpu", "cuda"]  # where the network is trained; "auto" takes CUDA where it is available
 
 
 @dataclass(frozen=True)
@@ -195,7 +197,7 @@ _HOLDING = (StageConfig("corners", 15), StageConfig("edges", 30))
 # The default has no stages that hold corners and edges: on seven models maps are as good without them (ARAP 1.01 times,
 # distance 1.01 times). With 30 steps towards S(1) the maps of two flat hard surfaces meet themselves.
 _FAST = Config("fast", NetworkConfig(scale=3.14), TrainConfig(), _stages(90, 60, 45), SplineConfig())
-PRESETS = {
+PRESETS: dict[PresetName, Config] = {
     "fast": _FAST,
     "grown": replace(_FAST, name="grown", train=replace(_FAST.train, easy_loss=0.0)),
     "paper": Config(
@@ -239,6 +241,7 @@ def preset(name: str) -> Config:
     >>> config.spline.control_points, config.stages[0].steps
     (20, 45)
     """
-    if not isinstance(name, str) or name not in PRESETS:
-        raise ValueError(f"unknown preset {name!r}: choose one of {', '.join(PRESETS)}")
-    return PRESETS[name]
+    for known, config in PRESETS.items():
+        if name == known:
+            return config
+    raise ValueError(f"unknown preset {name!r}: choose one of {', '.join(PRESETS)}")

@@ -1,17 +1,17 @@
-"""Holds the options of a surface and of the map that is made from it.
+"""Holds the options of a surface and of the map that is made from it, whose defaults and choices are those of `Config`.
 
 Annotations are evaluated in this module: a subclass in another module would look up their names in that module.
 """
 
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
+
+from parameterize.config import Config, Device, PresetName, RefinementConfig, SplineConfig
+from parameterize.config import preset as config_of
 
 from ..errors import InputError, input_errors
 from ..type_check import Checked
-
-if TYPE_CHECKING:
-    from parameterize.config import Config
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -74,25 +74,23 @@ class MapOptions(SurfaceOptions):
         20
     """
 
-    preset: Literal["fast", "grown", "paper"] = "fast"
+    preset: PresetName = "fast"
     seed: int = 0
-    device: Literal["auto", "cpu", "cuda"] = "auto"
-    control_points: int | Literal["auto"] = 30
+    device: Device = "auto"
+    control_points: int | Literal["auto"] = SplineConfig.control_points
     blocks: int | Literal["auto"] = "auto"
     corners: Path | None = None
     resume: bool = False
-    steps_factor: float = 1.0
-    tolerance: float = 5e-4
-    max_control_points: int = 60
+    steps_factor: float = Config.steps_factor
+    tolerance: float = RefinementConfig.tolerance
+    max_control_points: int = RefinementConfig.max_control_points
 
-    def config(self) -> "Config":
+    def config(self) -> Config:
         """Return the configuration of these options. Raises InputError for values that cannot be run."""
-        from parameterize.config import preset
-
         if self.seed < 0:
             raise InputError(f"seed {self.seed}: must not be negative")
         with input_errors():
-            config = preset(self.preset).scaled(self.steps_factor)
+            config = config_of(self.preset).scaled(self.steps_factor)
             if self.corners is not None:
                 config = config.holding_edges()
             config = config.with_blocks(None if self.blocks == "auto" else self.blocks)

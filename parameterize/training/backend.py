@@ -4,7 +4,9 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from ctypes import CDLL
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
+
+from ..config import Device
 
 PRECISIONS = "float32", "float64"
 _DRIVERS = "libcuda.so.1", "nvcuda.dll"  # of NVIDIA, on Linux and on Windows
@@ -13,7 +15,7 @@ _ROCM = Path("/dev/kfd")  # of AMD, which torch names cuda, too
 
 def choose_device(name: str) -> str:
     """Return the device, "cpu" or "cuda", for "auto", "cpu" or "cuda". Raises ValueError where it is absent."""
-    if name not in ("auto", "cpu", "cuda"):
+    if name not in get_args(Device):
         raise ValueError(f"device {name!r}: choose auto, cpu or cuda")
     available = name != "cpu" and _has_device()
     if name == "cuda" and not available:
