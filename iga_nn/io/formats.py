@@ -1,4 +1,4 @@
-"""Reads and writes volumes in the files of other programs: the table of formats, and where a solution goes.
+"""Reads and writes volumes in the files of other programs, whose table stands in `io.kinds`.
 
 docs/output.md explains our own files, NumPy archives without pickles.
 
@@ -10,8 +10,8 @@ for ParaView. IGES and STEP have no trivariate splines.
 
 import logging
 import zipfile
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, fields
+from collections.abc import Iterable, Sequence
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
@@ -30,37 +30,13 @@ from ..new_file import check_new
 from ..options import PROBLEMS
 from ..report import document as reports
 from ..type_check import check_type
-from . import gismo, mfem_writer, splinepy, view, vtk
-from .reading import ENDINGS, READERS, kind_of, read_body
+from .kinds import FORMATS, kind_of, read_body
 
 log = logging.getLogger(__name__)
 
 SHOWN = 3  # pairs of faces in a notice
 ALIKE = (".gltf", ".3mf")  # surfaces that begin as volumes do
 NARROWEST = 1e-100  # knot span: with the largest control points, derivatives stay within double precision
-
-
-@dataclass(frozen=True)
-class Format:
-    """Hold a format of another program.
-
-    ending: of its files, after the volume's stem. write: puts the volume into a file; it is also given the solution and
-    its problem, None where there are none, and the samples and quantities of a view. beside: ending and writer of a
-    second file, where the solution needs one; it is given the volume, too.
-    """
-
-    ending: str
-    write: Callable[..., None]
-    beside: tuple[str, Callable[[Path, Any, Any], None]] | None = None
-
-
-FORMATS = {
-    "gismo": Format(".xml", gismo.write_gismo, ("_u.xml", gismo.write_gismo_field)),
-    "mfem": Format(".mesh", mfem_writer.write_mfem, (".gf", mfem_writer.write_mfem_field)),
-    "vtk": Format("_bezier.vtu", vtk.write_bezier),
-    "view": Format("_view.vtu", view.write_view),
-    "json": Format(".json", splinepy.write_json, ("_u.json", splinepy.write_json)),
-}
 
 
 def is_volume(path: str | Path) -> bool:
@@ -71,7 +47,8 @@ def is_volume(path: str | Path) -> bool:
     """
     source = Path(path)
     suffix = (Path(source.stem) if source.suffix.lower() == ".gz" else source).suffix.lower()
-    endings = ("", ".zip", *ENDINGS.values(), *(ending for ending in SURFACES if ending not in ALIKE))
+    read = (kind.ending for kind in FORMATS.values() if kind.read)
+    endings = ("", ".zip", *read, *(ending for ending in SURFACES if ending not in ALIKE))
     if suffix == ".npz":
         return True
     if suffix not in endings or not source.is_file() or kind_of(source) is None:
@@ -133,7 +110,7 @@ def load_volume(path: str | Path, tolerance: float = TOLERANCE) -> BodyLike:
         kind = kind_of(source) if source.is_file() else "npz"
         if kind is None and source.suffix != ".npz":
             raise InputError(f"{source}: is not a spline volume; create one with `iga-nn run poisson {source}`")
-        body = read_body(source, kind, tolerance) if kind in READERS else Body.load(source)
+        body = read_body(source, kind, tolerance) if kind in FORMATS else Body.load(source)
     if near := body.nearly_glued:
         pairs = ", ".join(f"{pair} ({distance:.2g} apart)" for pair, distance in near[:SHOWN])
         more = f" and {len(near) - SHOWN} more" if len(near) > SHOWN else ""
@@ -194,10 +171,11 @@ def export(
         raise InputError(f"format {to!r}: samples and quantities are for --to view")
     if samples is not None and samples < 1:
         raise InputError(f"samples {samples}: must be 1 or larger")
-    if to not in FORMATS:
-        known = f"choose one of {', '.join(FORMATS)}; IGES and STEP have no trivariate splines"
-        raise InputError(f"format {to!r}: {known}{did_you_mean(to, FORMATS)}")
-    chosen = FORMATS[to]
+    chosen = FORMATS.get(to)
+    if chosen is None or chosen.write is None:
+        written = [name for name, kind in FORMATS.items() if kind.write is not None]
+        known = f"choose one of {', '.join(written)}; IGES and STEP have no trivariate splines"
+        raise InputError(f"format {to!r}: {known}{did_you_mean(to, written)}")
     target = check_new(
         Path(volume).stem + chosen.ending if out is None else out, chosen.ending[chosen.ending.index(".") :]
     )
