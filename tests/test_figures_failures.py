@@ -71,7 +71,7 @@ def test_the_figures_of_a_solve_and_of_a_study_cost_themselves_alone(all_drawn, 
     benchmark_volume(2).save("map.npz")
     monkeypatch.setattr(DRAW["study.png"], broken)
     monkeypatch.setattr(DRAW["named_faces.png"], broken)
-    report, _ = look(pipeline.solve_to("map.npz", "out", statement=replace(TWO_LEVELS, neumann=("u1",))).folder)
+    report, _ = look(pipeline.solve_to("map.npz", "out", problem_options=replace(TWO_LEVELS, neumann=("u1",))).folder)
     assert set(report["not_drawn"]) == {"convergence.png", "named_faces.png"}
     outcome, _ = pipeline.study_to("map.npz", "study", study_options=StudyOptions(refine=("0", "1")))
     assert set(look(outcome.folder)[0]["not_drawn"]) == {"study.png"}
@@ -90,7 +90,7 @@ def test_without_the_interactive_view_the_page_is_whole(in_folder, monkeypatch, 
 
     monkeypatch.setattr("iga_nn.report.viewer.scene_of", broken)
     benchmark_volume(2).save("map.npz")
-    report, text = look(pipeline.solve_to("map.npz", "out", statement=TWO_LEVELS).folder)
+    report, text = look(pipeline.solve_to("map.npz", "out", problem_options=TWO_LEVELS).folder)
     assert report["not_drawn"]["interactive view"] == "Invalid vmin or vmax"
     assert "interactive view could not be drawn" in text and "Convergence" in text
     _, console, _ = browse(chromium, tmp_path, (in_folder / "out/report.html").as_uri(), 700)
@@ -100,7 +100,7 @@ def test_without_the_interactive_view_the_page_is_whole(in_folder, monkeypatch, 
 def test_a_page_that_fails_is_written_bare(in_folder, monkeypatch):
     monkeypatch.setattr(page, "_facts", broken)
     benchmark_volume(2).save("map.npz")
-    outcome = pipeline.solve_to("map.npz", "out", statement=TWO_LEVELS)
+    outcome = pipeline.solve_to("map.npz", "out", problem_options=TWO_LEVELS)
     _, text = look(outcome.folder)
     assert "could not be laid out" in text and "&quot;poisson&quot;" in text
 
@@ -108,7 +108,7 @@ def test_a_page_that_fails_is_written_bare(in_folder, monkeypatch):
 def test_plotting_that_cannot_be_imported_costs_the_figures(in_folder, monkeypatch):
     monkeypatch.setattr(rendering, "can_draw", None)
     benchmark_volume(2).save("map.npz")
-    report, _ = look(pipeline.solve_to("map.npz", "out", statement=TWO_LEVELS).folder)
+    report, _ = look(pipeline.solve_to("map.npz", "out", problem_options=TWO_LEVELS).folder)
     assert set(report["not_drawn"]) == {"figures"}
 
 

@@ -97,7 +97,7 @@ def test_a_problem_is_solved_on_a_finished_volume_and_again_on_the_same(tmp_path
     assert [job.name for job in jobs] == ["my cube.obj", "my cube.npz", "my cube.npz"]
     assert third.volume == third.path and third.path.read_bytes() == b"volume"
     assert third.path.with_name("boundary.npz").read_bytes() == b"part"  # regions are found on it
-    assert third.statement.exact == "y" and third.results != third.path
+    assert third.problem_options.exact == "y" and third.results != third.path
     jobs.close()
 
 

@@ -94,7 +94,7 @@ def test_once_the_volume_of_this_run_is_made_the_last_stage_has_begun(tmp_path):
 
 def test_a_failed_problem_has_its_form_to_correct(tmp_path):
     options = PoissonOptions(exact="x")
-    job = Job(3, "bean.npz", tmp_path, state="failed", statement=PoissonOptions(source="log(x)"), parent=1)
+    job = Job(3, "bean.npz", tmp_path, state="failed", problem_options=PoissonOptions(source="log(x)"), parent=1)
     assert "form" not in row(job, 0, options)  # no volume
     job.path.write_bytes(b"volume")
     said = row(job, 0, options)

@@ -8,7 +8,6 @@ from iga_nn.errors import InputError
 from iga_nn.options import (
     PROBLEMS,
     ElasticityOptions,
-    ElasticityStudyOptions,
     MapOptions,
     PoissonOptions,
     StudyOptions,
@@ -120,7 +119,6 @@ def test_a_value_of_another_kind_is_refused_where_the_options_are_made(made, say
     [
         (StudyOptions(refine=("3..1",)).levels, "refine '3..1': the range ends before it begins; write 1..3"),
         (PoissonOptions(refine=()).problem, "refine is empty: give one or more levels"),
-        (ElasticityStudyOptions("x;y;z", traction=("u1=0;0;0",)).problem, "traction u1=0;0;0: a study takes that of"),
         (ElasticityOptions("x;y;z", young=1e300).problem, "young must be a positive number from 1e-100 to 1e.100"),
     ],
 )

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from iga_nn.cli.commands import app
-from iga_nn.options import ElasticityOptions, ElasticityStudyOptions, MapOptions, PoissonOptions, StudyOptions
+from iga_nn.options import ElasticityOptions, MapOptions, PoissonOptions, StudyOptions
 from iga_nn.workflow.command_line import command_line
 
 
@@ -26,7 +26,7 @@ def options_of(line: str) -> tuple[object, ...]:
         ("solve poisson", (PoissonOptions(source="1", boundary="0", kappa="2,0,0,1,0,1", refine=(1, 2), degree=4),)),
         ("solve elasticity", (ElasticityOptions(body_force="0;0;-1", traction=("u1=1;0;0",), young=2.5),)),
         ("run elasticity", (MapOptions(seed=3), ElasticityOptions(exact="x;y;z", traction=("u1",)))),
-        ("study elasticity", (ElasticityStudyOptions(exact="x;y;z", traction=("u1", "v0"), degree=(2,), young=2.5),)),
+        ("study elasticity", (ElasticityOptions(exact="x;y;z", traction=("u1", "v0"), young=2.5), StudyOptions((2,)))),
         ("study", (StudyOptions(degree=(2, 3), refine=("0..3",)),)),
     ],
 )
@@ -34,7 +34,8 @@ def test_the_line_gives_the_options_back(command, chosen):
     line = command_line(command, "my file.npz", *chosen, out="here")
     given = options_of(line)
     for options in chosen:
-        assert options in given or options == type(options)()  # defaults are not written, nor bound
+        is_given = any(isinstance(one, type(options)) and vars(one) == vars(options) for one in given)
+        assert is_given or options == type(options)()  # defaults are not written, nor bound
 
 
 def test_defaults_and_resuming_are_left_out():

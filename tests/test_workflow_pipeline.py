@@ -96,7 +96,7 @@ def test_a_solve_keeps_a_solution_that_no_report_tells_of(in_folder):
     held.parent.mkdir()
     held.write_bytes(b"my own")
     with pytest.raises(InputError, match="holds solution.npz without a report"):
-        pipeline.solve_to("mine.npz", "out", statement=PoissonOptions(refine=(0,)))
+        pipeline.solve_to("mine.npz", "out", problem_options=PoissonOptions(refine=(0,)))
     assert held.read_bytes() == b"my own"
 
 
@@ -169,22 +169,22 @@ def test_given_corners_are_marked_in_the_picture(formula_training, in_folder, mo
 def test_the_faces_that_a_solve_names_are_shown_until_the_next_solve(in_folder):
     benchmark_volume(3).save("map.npz")
     mixed = PoissonOptions(neumann=("u1",), refine=(0,))
-    outcome = pipeline.solve_to("map.npz", "out", statement=mixed)
+    outcome = pipeline.solve_to("map.npz", "out", problem_options=mixed)
     picture = outcome.folder / "named_faces.png"
     if can_draw():
         assert picture.is_file()
     picture.touch()
     assert "faces by name</h2>" in (outcome.folder / "report.html").read_text() or not can_draw()
-    pipeline.solve_to("map.npz", "out", statement=PoissonOptions(refine=(0,)), force=True)
+    pipeline.solve_to("map.npz", "out", problem_options=PoissonOptions(refine=(0,)), force=True)
     assert not picture.exists()
 
 
 def test_a_device_that_cannot_solve_the_problem_costs_no_file(in_folder):
     benchmark_volume(3).save("map.npz")
-    pipeline.solve_to("map.npz", "out", statement=PoissonOptions(refine=(0,)))
+    pipeline.solve_to("map.npz", "out", problem_options=PoissonOptions(refine=(0,)))
     before = {file.name: file.read_bytes() for file in Path("out").iterdir()}
     with pytest.raises(InputError, match="elasticity runs on device='cpu' only"):
-        pipeline.solve_to("map.npz", "out", statement=ElasticityOptions(exact="x;0;0"), force=True, device="cuda")
+        pipeline.solve_to("map.npz", "out", problem_options=ElasticityOptions(exact="x;0;0"), force=True, device="cuda")
     assert {file.name: file.read_bytes() for file in Path("out").iterdir()} == before
 
 

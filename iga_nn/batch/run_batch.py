@@ -10,7 +10,7 @@ from threading import RLock
 from parameterize.files import save_text
 
 from ..errors import InputError, expected_errors, one_line
-from ..options import MapOptions, PoissonOptions, WorkerOptions
+from ..options import MapOptions, ProblemOptions, WorkerOptions
 from ..report import document as reports
 from ..rounding import rounded
 from ..type_check import check_type
@@ -45,16 +45,17 @@ Progress = Callable[[Batch, Sequence[Running]], None]
 def run_batch(
     surfaces: Sequence[str | Path],
     out: str | Path,
+    problem: str = "poisson",
     *,
     mapping: MapOptions | None = None,
-    poisson: PoissonOptions | None = None,
     workers: WorkerOptions | None = None,
     split: bool = False,
     force: bool = False,
     vector: bool = False,
     progress: Progress | None = None,
+    **given: ProblemOptions | None,
 ) -> Batch:
-    """Parameterize many surfaces and solve Poisson's equation on them in worker processes; return the table.
+    """Parameterize many surfaces and solve a problem on each in worker processes; return the table.
 
     Each surface has a folder of its own in `out`, named after it; batch.csv, batch.json and batch.html beside them are
     written anew after every surface. One that is finished with the same options is skipped, one that has a checkpoint
@@ -66,10 +67,10 @@ def run_batch(
         Files, folders, patterns, names of samples and models, or "g1", the models of that set.
     out : str or Path
         The folder of the batch.
+    problem : str
+        "poisson" or "elasticity".
     mapping : MapOptions, optional
         How a surface becomes a volume.
-    poisson : PoissonOptions, optional
-        The problem that is solved on each.
     workers : WorkerOptions, optional
         Options of the worker processes; two of this machine by default.
     split : bool
@@ -81,6 +82,8 @@ def run_batch(
         Write plots of curves as PDF, too.
     progress : callable, optional
         Called after every change with the batch and the list of its running surfaces.
+    **given : PoissonOptions or ElasticityOptions
+        Options of the problem that is solved on each, under its name: poisson=PoissonOptions(...).
 
     Returns
     -------
@@ -108,18 +111,21 @@ def run_batch(
     >>> len(batch.rows), batch.rows[0].report == outcome.report
     (1, True)
     """
-    mapping, statement, workers = mapping or MapOptions(), poisson or PoissonOptions(), workers or WorkerOptions()
+    mapping, workers, problem_options = (
+        mapping or MapOptions(),
+        workers or WorkerOptions(),
+        pipeline.chosen(problem, given),
+    )
     for name, value, kind in (
         ("surfaces", surfaces, tuple[str | Path, ...]),
         ("out", out, str | Path),
         ("mapping", mapping, MapOptions),
-        ("poisson", statement, PoissonOptions),
         ("workers", workers, WorkerOptions),
         ("split", split, bool),
         ("progress", progress, Callable | None),
     ):
         check_type(name, value, kind)
-    pipeline.checked(mapping, statement)
+    pipeline.checked(mapping, problem_options)
     if out == "":
         raise InputError("out is empty: name a folder")
     corners = None if mapping.corners is None else Path(mapping.corners).absolute()
@@ -129,7 +135,7 @@ def run_batch(
     if split and mapping.component is not None:
         raise InputError("split takes every component: leave --component out")
     tasks = [
-        Task(entry.name, entry.mesh, entry.folder, replace(common, component=number), statement, vector)
+        Task(entry.name, entry.mesh, entry.folder, replace(common, component=number), problem_options, vector)
         for entry, number in (
             divided(entries, mapping.max_faces) if split else [(entry, mapping.component) for entry in entries]
         )
@@ -166,7 +172,7 @@ def _found(task: Task, force: bool) -> Row:
         if force:
             forget(task.folder)
             return row
-        finished = pipeline.finished_run(task.mesh, task.folder, task.mapping, task.statement, vector=task.vector)
+        finished = pipeline.finished_run(task.mesh, task.folder, task.mapping, task.problem_options, vector=task.vector)
     except expected_errors() as error:
         refused = row.ended(Ended("refused", one_line(error)))
         log.warning("%s", refused.as_line())

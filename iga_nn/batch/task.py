@@ -22,11 +22,11 @@ _stopped: set[str] = set()  # batches that were interrupted
 class Task(Entry):
     """Hold a surface of a batch and all options of its result.
 
-    statement: the problem to solve, None for the map alone. vector: whether curves are also written as PDF.
+    problem_options: the problem to solve, None for the map alone. vector: whether curves are also written as PDF.
     """
 
     mapping: MapOptions
-    statement: ProblemOptions | None
+    problem_options: ProblemOptions | None
     vector: bool = False
 
 
@@ -48,7 +48,11 @@ def compute(task: Task, number: int, batch: str) -> Ended:
 
     def run() -> Outcome:
         progress = throttled(tell, lambda: batch in _stopped)
-        given: dict[str, Any] = {"mapping": task.mapping, "statement": task.statement, "vector": task.vector}
+        given: dict[str, Any] = {
+            "mapping": task.mapping,
+            "problem_options": task.problem_options,
+            "vector": task.vector,
+        }
         return pipeline.parameterize_to(task.mesh, task.folder, progress=progress, **given)
 
     with logged(logging.NullHandler()):  # warnings are in the report: a surface has one line on the terminal

@@ -2,14 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, fields, make_dataclass
 from pathlib import Path
-from typing import Annotated, Any, get_args
+from types import FunctionType
+from typing import Annotated, Any, get_args, get_type_hints
 
-from cyclopts import CycloptsError, Parameter, Token, convert
+from cyclopts import App, CycloptsError, Parameter, Token, convert
 
-from ..options import MapOptions, ModesOptions, ProblemOptions, StudyOptions, SurfaceOptions, WorkerOptions
+from ..options import (
+    PROBLEMS,
+    UNITS,
+    MapOptions,
+    ModesOptions,
+    ProblemOptions,
+    StudyOptions,
+    SurfaceOptions,
+    WorkerOptions,
+)
 
 
 def converted(kind: Any, tokens: Sequence[Token]) -> Any:
@@ -26,6 +36,40 @@ def with_values(argv: Sequence[str]) -> list[str]:
         if word == "--close" and words[place + 1 : place + 2] != ["all"]:
             words[place] = "--close=true"
     return words
+
+
+OF_STUDY = ("refine", "degree", "quadrature", *UNITS)  # options of a problem that a study has of its own, or fixes
+
+
+def for_each_problem(group: App, *, is_default: bool = False, hidden: Sequence[str] = ()) -> Callable[[Any], Any]:
+    """Return a decorator that makes a command of each problem: its `problem_options` takes the options of that problem.
+
+    is_default: whether the group itself is the command of the first problem, too. hidden: options that are no flags.
+    """
+
+    def add(command: FunctionType) -> FunctionType:
+        for name, kind in PROBLEMS.items():
+            taken = _without(kind, hidden)
+            one = FunctionType(command.__code__, command.__globals__, command.__name__, command.__defaults__)
+            one.__kwdefaults__ = (command.__kwdefaults__ or {}) | {"problem_options": taken()}
+            one.__annotations__ = command.__annotations__ | {"problem_options": taken}
+            one.__doc__ = (command.__doc__ or "").format(title=kind.title)
+            if is_default and kind is next(iter(PROBLEMS.values())):
+                group.default(one)
+            group.command(one, name=name)
+        return command
+
+    return add
+
+
+def _without(kind: type[ProblemOptions], names: Sequence[str]) -> type[ProblemOptions]:
+    """Return the options of a problem of which some are no flags, and have their defaults."""
+    hints, left = get_type_hints(kind), [field for field in fields(kind) if field.name in names]
+    if not left:
+        return kind
+    rows = [(field.name, Annotated[hints[field.name], Parameter(parse=False)], field.default) for field in left]
+    own = {"__doc__": kind.__doc__, "__module__": kind.__module__}  # where its annotations mean something
+    return make_dataclass(kind.__name__, rows, bases=(kind,), frozen=True, namespace=own)
 
 
 Mesh = Annotated[str, Parameter(help="path of a closed surface, or the name of a sample or a model.")]

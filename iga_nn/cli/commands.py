@@ -15,8 +15,6 @@ from cyclopts import App, CycloptsError, Parameter
 
 from ..errors import InputError, expected_errors, input_errors
 from ..options import (
-    ElasticityOptions,
-    ElasticityStudyOptions,
     MapOptions,
     ModesOptions,
     PoissonOptions,
@@ -27,7 +25,20 @@ from ..options import (
 )
 from ..version import __version__
 from . import BAD_INPUT, DONE, INTERRUPTED, NOT_SOLVED
-from .arguments import Json, Mesh, Mpi, ObjFile, OutputOptions, Overwrite, PageOptions, Volume, converted, with_values
+from .arguments import (
+    OF_STUDY,
+    Json,
+    Mesh,
+    Mpi,
+    ObjFile,
+    OutputOptions,
+    Overwrite,
+    PageOptions,
+    Volume,
+    converted,
+    for_each_problem,
+    with_values,
+)
 from .progress import shown_batch, shown_progress
 from .refusal import refusal
 
@@ -46,60 +57,53 @@ solve_app = App(name="solve", help="Solve a problem on a volume.")
 study_app = App(
     name="study", help="Solve on finer and finer meshes of a volume.npz; write a table, CSV and a plot of the rates."
 )
-for group in (run_app, solve_app, study_app):
+batch_app, page_app = App(name="batch"), App(name="app")
+for group in (run_app, solve_app, study_app, batch_app, page_app):
     app.command(group)
 
 
-@run_app.command(name="poisson")
-def run_poisson(
+@for_each_problem(run_app)
+def run_problem(
     mesh: Mesh,
     /,
     *,
     output: OutputOptions = OutputOptions(),
     mapping: MapOptions = MapOptions(),
-    poisson: PoissonOptions = PoissonOptions(),
+    problem_options: ProblemOptions = PoissonOptions(),
 ) -> int:
-    """Parameterize a surface, certify the spline and solve Poisson's equation on it."""
-    return _run(mesh, output, mapping, poisson)
-
-
-@run_app.command(name="elasticity")
-def run_elasticity(
-    mesh: Mesh,
-    /,
-    *,
-    output: OutputOptions = OutputOptions(),
-    mapping: MapOptions = MapOptions(),
-    elasticity: ElasticityOptions = ElasticityOptions(),
-) -> int:
-    """Parameterize a surface, certify the spline and solve linear elasticity on it.
+    """Parameterize a surface, certify the spline and solve {title} on it.
 
     named_faces.png shows which face of the volume is u0, u1, v0, v1, w0, w1; --corners decides it beforehand.
     """
-    return _run(mesh, output, mapping, elasticity)
+    return _run(mesh, output, mapping, problem_options)
 
 
-def _run(mesh: str, output: OutputOptions, mapping: MapOptions, statement: ProblemOptions | None = None) -> int:
+def _run(mesh: str, output: OutputOptions, mapping: MapOptions, problem_options: ProblemOptions | None = None) -> int:
     """Parameterize a surface, solve a problem on the volume, print the verdict and return the exit code."""
     from ..workflow import pipeline
 
     with shown_progress(output.quiet) as progress:
         outcome = pipeline.parameterize_to(
-            mesh, mapping=mapping, statement=statement, progress=progress, paints_beside=True, **output.folder
+            mesh,
+            mapping=mapping,
+            problem_options=problem_options,
+            progress=progress,
+            paints_beside=True,
+            **output.folder,
         )
     return _finish(outcome, output)
 
 
-@app.command(name="batch")
+@for_each_problem(batch_app, is_default=True)
 def run_many(
     *surfaces: str,
     split: bool = False,
     output: OutputOptions = OutputOptions(),
     workers: WorkerOptions = WorkerOptions(),
     mapping: MapOptions = MapOptions(),
-    poisson: PoissonOptions = PoissonOptions(),
+    problem_options: ProblemOptions = PoissonOptions(),
 ) -> int:
-    """Run many surfaces in worker processes, each into its own folder in --out, with one table.
+    """Run many surfaces in worker processes, each into its own folder in --out, with one table; solve {title} on each.
 
     batch.csv, batch.json and batch.html are written anew after every surface. The same command again skips finished
     surfaces, continues from checkpoints and tries failures once more.
@@ -115,8 +119,8 @@ def run_many(
     if output.out is None:
         raise InputError("batch needs a folder for its results: name it with --out")
     with shown_batch(output.quiet) as progress:
-        given = output.folder | {"mapping": mapping, "poisson": poisson, "workers": workers}
-        batch = run_batch(surfaces, split=split, progress=progress, **given)
+        given = output.folder | {"mapping": mapping, "workers": workers, problem_options.section: problem_options}
+        batch = run_batch(surfaces, problem=problem_options.section, split=split, progress=progress, **given)
     words = f"{batch.summary}\nresults in {batch.folder}"
     _print(reports.as_json(batch.as_dict()) if output.as_json else words)
     return batch_exit_code(batch)
@@ -130,83 +134,56 @@ def parameterize_mesh(
     return _run(mesh, output, mapping)
 
 
-@solve_app.command(name="poisson")
-def solve_poisson(
+@for_each_problem(solve_app)
+def solve_problem(
     volume: Volume,
     /,
     *,
     device: Literal["cpu", "cuda"] = "cpu",
     mpi: Mpi = False,
     output: OutputOptions = OutputOptions(),
-    poisson: PoissonOptions = PoissonOptions(),
+    problem_options: ProblemOptions = PoissonOptions(),
 ) -> int:
-    """Solve Poisson's equation, -div(kappa grad u) + c u = f, on a volume.npz.
+    """Solve {title} on a volume.npz.
 
-    The volume's six faces u0, u1, v0, v1, w0, w1, the images of u = 0, u = 1 and so on, carry values of u unless named
-    under --neumann or --robin.
+    The volume's six faces u0, u1, v0, v1, w0, w1, the images of u = 0, u = 1 and so on, carry values of u unless an
+    option names them.
 
     Args:
-        device: where the linear system is solved.
+        device: where the linear system is solved; cuda takes Poisson's equation alone.
     """
-    return _solve(volume, output, poisson, mpi, device)
+    return _solve(volume, output, problem_options, mpi, device)
 
 
-@solve_app.command(name="elasticity")
-def solve_elasticity(
-    volume: Volume,
-    /,
-    *,
-    mpi: Mpi = False,
-    output: OutputOptions = OutputOptions(),
-    elasticity: ElasticityOptions = ElasticityOptions(),
-) -> int:
-    """Solve linear elasticity on a volume.npz.
-
-    A vector is three formulas separated by semicolons, in quotes: "x*y;0;sin(z)". The volume's six faces u0, u1, v0,
-    v1, w0, w1, the images of u = 0, u = 1 and so on, carry displacements unless named under --traction.
-    """
-    return _solve(volume, output, elasticity, mpi)
-
-
-def _solve(volume: Path, output: OutputOptions, statement: ProblemOptions, mpi: bool, device: str = "cpu") -> int:
+def _solve(volume: Path, output: OutputOptions, problem_options: ProblemOptions, mpi: bool, device: str) -> int:
     """Solve a problem on a volume, print the verdict and return the exit code."""
     from ..workflow import mpi_job, pipeline
 
     with shown_progress(output.quiet):
         comm = mpi_job.all_processes() if mpi else None
-        outcome = pipeline.solve_to(volume, statement=statement, device=device, comm=comm, **output.folder)
+        outcome = pipeline.solve_to(volume, problem_options=problem_options, device=device, comm=comm, **output.folder)
     return DONE if outcome is None else _finish(outcome, output)
 
 
-@study_app.default
+@for_each_problem(study_app, is_default=True, hidden=OF_STUDY)
 def study_volume(
-    volume: Volume, /, *, output: OutputOptions = OutputOptions(), study: StudyOptions = StudyOptions()
-) -> int:
-    """Solve on finer and finer meshes of a volume.npz; write a table, CSV and a plot of the errors and their rates.
-
-    Results go to STEM-study in the current folder, unless --out names another.
-    """
-    return _study(volume, output, study)
-
-
-@study_app.command(name="elasticity")
-def study_elasticity(
     volume: Volume,
     /,
     *,
     output: OutputOptions = OutputOptions(),
-    study: ElasticityStudyOptions = ElasticityStudyOptions(),
+    study: StudyOptions = StudyOptions(),
+    problem_options: ProblemOptions = PoissonOptions(),
 ) -> int:
-    """Make a convergence study of linear elasticity with a given displacement."""
-    return _study(volume, output, study)
+    """Solve {title} on finer and finer meshes of a volume.npz; write a table, CSV and a plot of the errors' rates.
 
-
-def _study(volume: Path, output: OutputOptions, study: StudyOptions) -> int:
-    """Make a convergence study, print its table and return the exit code."""
+    The problem has an exact solution. Results go to STEM-study in the current folder, unless --out names another.
+    """
     from ..workflow import pipeline
 
     with shown_progress(output.quiet):
-        outcome, table = pipeline.study_to(volume, study_options=study, **output.folder)
+        outcome, table = pipeline.study_to(
+            volume, problem_options=problem_options, study_options=study, **output.folder
+        )
     return _tell(outcome, output, outcome.report.get("study"), table)
 
 
@@ -365,16 +342,18 @@ def compare_runs(one: Path, other: Path, /, *, out: Path = Path("compare.html"),
     _print(f"{comparison.as_text(*runs)}\nopen {target}")
 
 
-@app.command(name="app")
+@for_each_problem(page_app, is_default=True)
 def serve_page(
     *,
     port: int = 8080,
     open_browser: Annotated[bool, Parameter(name="--open")] = False,
     max_upload: int = 64,
     mapping: PageOptions = PageOptions(),
-    poisson: PoissonOptions = PoissonOptions(),
+    problem_options: ProblemOptions = PoissonOptions(),
 ) -> None:
     """Serve a page to this computer's browser: drop a surface, watch it become a volume, download the files.
+
+    {title} is what its form states first.
 
     Args:
         port: port of 127.0.0.1; 0 takes a free port.
@@ -384,7 +363,14 @@ def serve_page(
     from ..live.app import serve
 
     surfaces = MapOptions(**vars(mapping))
-    serve(_print, port=port, open_browser=open_browser, max_upload=max_upload, mapping=surfaces, poisson=poisson)
+    serve(
+        _print,
+        port=port,
+        open_browser=open_browser,
+        max_upload=max_upload,
+        mapping=surfaces,
+        problem_options=problem_options,
+    )
 
 
 def main(argv: list[str]) -> int:

@@ -5,7 +5,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from ..errors import InputError, input_errors
-from ..options import MapOptions, PoissonOptions
+from ..options import MapOptions, ProblemOptions
 
 INSTALL = "pip install 'iga-nn[app]'"
 
@@ -17,14 +17,14 @@ def serve(
     open_browser: bool,
     max_upload: int,
     mapping: MapOptions,
-    poisson: PoissonOptions,
+    problem_options: ProblemOptions,
 ) -> None:
     """Serve the page until interrupted. say: receives the address. max_upload: in megabytes.
 
     Raises InputError for options that cannot be run, where trame is missing and where the port is taken.
     """
     mapping.config()
-    poisson.problem()
+    problem_options.problem()
     if not 0 <= port <= 65_535:
         raise InputError(f"port {port}: must lie between 0, for any free one, and 65535")
     if max_upload < 1:
@@ -35,4 +35,4 @@ def serve(
         package = (error.name or "trame").partition(".")[0]
         raise InputError(f"the live page needs {package}, which is not installed: {INSTALL}") from None
     with TemporaryDirectory(prefix="iga-nn-") as root, input_errors():
-        Page(Path(root), max_upload, mapping, poisson).run(say, port, open_browser)
+        Page(Path(root), max_upload, mapping, problem_options).run(say, port, open_browser)

@@ -35,8 +35,8 @@ STARTS, DELETED = ("ready", "stopped", "failed"), ("refused", "ready", "done", "
 class Job:
     """Hold the file of a surface, or of a volume to solve on, in a folder of its own, and its state.
 
-    statement: the problem to solve on a volume; None for a surface. wanted: the problem to solve on the volume of a
-    surface; None for that of the page's options. picked: triangles of the face that was clicked, (k,). parent: number
+    problem_options: the problem to solve on a volume; None for a surface. wanted: the problem to solve on the volume of
+    a surface; None for that of the page's options. picked: triangles of the face that was clicked, (k,). parent: number
     of the job that made the volume. text: the reason why the job was refused or failed. mapped: the surface's vertices
     under the map of the training, (n, 3) in the cube. losses: the reported losses of the training. log: the lines of
     the run. begun: the start of the run, in seconds of the system's clock.
@@ -46,7 +46,7 @@ class Job:
     name: str
     folder: Path
     state: str = "checking"
-    statement: ProblemOptions | None = None
+    problem_options: ProblemOptions | None = None
     wanted: ProblemOptions | None = None
     parent: int = 0
     text: str = ""
@@ -73,7 +73,7 @@ class Job:
     @property
     def volume(self) -> Path:
         """Return the path of the volume that was made, or that is solved on."""
-        return self.path if self.statement else self.results / "volume.npz"
+        return self.path if self.problem_options else self.results / "volume.npz"
 
     @property
     def is_mapped(self) -> bool:
@@ -140,7 +140,7 @@ class Jobs:
         """Put the job's surface into the queue of surfaces to check."""
         self._checker.submit(self._check_now, job)
 
-    def solve(self, done: Job, statement: ProblemOptions) -> Job:
+    def solve(self, done: Job, problem_options: ProblemOptions) -> Job:
         """Put a new job into the queue, which solves a problem on the volume of another; return it.
 
         The part's surface goes with the volume, where it is known: regions are found on it.
@@ -156,7 +156,7 @@ class Jobs:
             job.state = "refused"
             self.delete(job)
             raise
-        job.statement, job.parent, job.state = statement, done.parent or done.number, "ready"
+        job.problem_options, job.parent, job.state = problem_options, done.parent or done.number, "ready"
         self.start(job)
         return job
 

@@ -29,7 +29,7 @@ from parameterize.surface.surface import Surface
 
 from ..errors import InputError, one_line
 from ..models import resolve
-from ..options import MapOptions, PoissonOptions
+from ..options import MapOptions, ProblemOptions
 from ..samples import SAMPLES, sample, write_obj
 from ..workflow.output_folder import has_checkpoint
 from . import form
@@ -58,9 +58,9 @@ Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
 class Page:
     """Serve one page: its trame server, its routes, its jobs. max_upload: megabytes a file may have."""
 
-    def __init__(self, root: Path, max_upload: int, mapping: MapOptions, poisson: PoissonOptions) -> None:
+    def __init__(self, root: Path, max_upload: int, mapping: MapOptions, problem_options: ProblemOptions) -> None:
         self._server: Any = get_server("iga-nn", client_type="vue3")
-        self._limit, self._mapping, self._poisson = max_upload * MEGABYTE, mapping, poisson
+        self._limit, self._mapping, self._problem_options = max_upload * MEGABYTE, mapping, problem_options
         self._loop: asyncio.AbstractEventLoop | None = None
         self._drawn: dict[int, tuple[Array, IntArray | None]] = {}  # points and the face picked last sent, by job
         self.jobs = Jobs(root, self._check, self._run, self._tell)
@@ -114,8 +114,10 @@ class Page:
         return replace(surface, notices=(*surface.notices, *filter(None, [notice])))
 
     def _run(self, job: Job) -> Iterator[Message]:
-        mapping = None if job.statement else replace(self._mapping, resume=has_checkpoint(job.results))
-        return job_process.run(job.folder, job.name, mapping, job.statement or job.wanted or self._poisson, job.stop)
+        mapping = None if job.problem_options else replace(self._mapping, resume=has_checkpoint(job.results))
+        return job_process.run(
+            job.folder, job.name, mapping, job.problem_options or job.wanted or self._problem_options, job.stop
+        )
 
     def _act(self, act: Callable[[Job], None], number: int) -> None:
         if job := self.jobs.find(number):
@@ -138,7 +140,7 @@ class Page:
     def _show(self, changed: Job) -> None:
         with self._server.state as state:
             jobs = list(self.jobs)
-            state.jobs = [row(job, self.jobs.before(job), self._poisson) for job in jobs]
+            state.jobs = [row(job, self.jobs.before(job), self._problem_options) for job in jobs]
             state.latest = self.jobs.latest
             running = [job.number for job in jobs if job.state == "running"]
             state.current = max(running or [job.number for job in jobs], default=0)
@@ -258,7 +260,7 @@ class Page:
             raise web.HTTPNotFound
         try:
             if given and is_ahead(job):
-                job.wanted = form.stated(given, self._poisson, has_faces=False)
+                job.wanted = form.stated(given, self._problem_options, has_faces=False)
         except InputError as error:
             raise web.HTTPBadRequest(text=one_line(error)) from None
         self.jobs.start(job)
@@ -270,11 +272,11 @@ class Page:
         if job is None or not is_solvable(job):
             raise web.HTTPNotFound(text="this job has no volume to solve on")
         try:
-            statement = form.stated(await request.post(), self._poisson)
+            problem_options = form.stated(await request.post(), self._problem_options)
         except InputError as error:
             raise web.HTTPBadRequest(text=one_line(error)) from None
         try:
-            made = await asyncio.to_thread(self.jobs.solve, job, statement)
+            made = await asyncio.to_thread(self.jobs.solve, job, problem_options)
         except OSError as error:
             raise web.HTTPNotFound(text=f"the volume cannot be copied: {one_line(error)}") from None
         return web.Response(text=str(made.number))

@@ -42,19 +42,20 @@ PICKED = (240, 140, 20)
 EDGES_UP_TO = 3_000  # faces: surfaces with more are drawn without edges
 
 
-def row(job: Job, before: int, statement: ProblemOptions) -> dict[str, Any]:
+def row(job: Job, before: int, problem_options: ProblemOptions) -> dict[str, Any]:
     """Return the entry of a job on the page, in JSON's own types.
 
-    before: jobs ahead of it in the queue. statement: the problem of the page's options.
+    before: jobs ahead of it in the queue. problem_options: the problem of the page's options.
     """
     said: dict[str, Any] = {
         "number": job.number,
         "name": job.name,
         "state": job.state,
         "label": LABELS.get(job.state, job.state) + (f", {before} job{'s' * (before > 1)} ahead" if before else ""),
-        "what": f"{form.in_words(job.statement)}; on the volume of {job.parent}" if job.statement else "",
+        "what": f"{form.in_words(job.problem_options)}; on the volume of {job.parent}" if job.problem_options else "",
         "text": job.text,
-        "starts": job.state in STARTS and not (job.statement and job.state == "failed"),  # a solve would fail again
+        "starts": job.state in STARTS
+        and not (job.problem_options and job.state == "failed"),  # a solve would fail again
         "deletes": job.state in DELETED,
         "stopping": job.state == "running" and job.stop.is_set(),
         "line": job.log[-1] if job.log else "",
@@ -63,7 +64,7 @@ def row(job: Job, before: int, statement: ProblemOptions) -> dict[str, Any]:
         "files": _files(job) if job.state in ENDED else [],
     }
     if is_solvable(job) or is_ahead(job):
-        said["form"] = form.filled(job.statement or job.wanted or statement)
+        said["form"] = form.filled(job.problem_options or job.wanted or problem_options)
         said["ahead"] = is_ahead(job)
     if job.surface is not None:
         vertices, faces = len(job.surface.vertices), len(job.surface.faces)

@@ -38,7 +38,7 @@ Message = Step | str | Ended  # a string is a line of the log
 
 
 def run(
-    folder: Path, name: str, mapping: MapOptions | None, statement: ProblemOptions, stop: Event
+    folder: Path, name: str, mapping: MapOptions | None, problem_options: ProblemOptions, stop: Event
 ) -> Iterator[Message]:
     """Run the surface `name` in `folder`, which also takes the results; yield messages as they come, an Ended last.
 
@@ -47,7 +47,7 @@ def run(
     spawn = multiprocessing.get_context("spawn")  # a copy of a process with threads may hang
     receiver, sender = spawn.Pipe(duplex=False)
     halt = spawn.Event()
-    process = spawn.Process(target=_work, args=(sender, halt, folder, name, mapping, statement), daemon=True)
+    process = spawn.Process(target=_work, args=(sender, halt, folder, name, mapping, problem_options), daemon=True)
     process.start()
     sender.close()
     try:
@@ -89,7 +89,7 @@ def _work(
     folder: Path,
     name: str,
     mapping: MapOptions | None,
-    statement: ProblemOptions,
+    problem_options: ProblemOptions,
 ) -> None:
     """Run the job in the child process, in the job's folder: messages then name the file as the user does."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent handles Ctrl-C in the terminal
@@ -100,9 +100,11 @@ def _work(
 
     def work() -> Outcome | None:
         if mapping is None:
-            return pipeline.solve_to(name, statement=statement, force=True)  # replaces the files of a stopped solve
+            return pipeline.solve_to(
+                name, problem_options=problem_options, force=True
+            )  # replaces the files of a stopped solve
         return pipeline.parameterize_to(
-            name, mapping=mapping, statement=statement, progress=throttled(tell, halt.is_set)
+            name, mapping=mapping, problem_options=problem_options, progress=throttled(tell, halt.is_set)
         )
 
     with logged(_Lines(sender), logging.INFO):

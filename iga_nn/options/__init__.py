@@ -1,12 +1,12 @@
 """Holds the options of the pipeline and of the command line, and checks their values."""
 
-from .analysis import ElasticityStudyOptions as ElasticityStudyOptions
 from .analysis import ModesOptions as ModesOptions
 from .analysis import StudyOptions as StudyOptions
 from .mapping import MapOptions as MapOptions
 from .mapping import SurfaceOptions as SurfaceOptions
 from .problem import NO_UNITS as NO_UNITS
 from .problem import PROBLEMS as PROBLEMS
+from .problem import UNITS as UNITS
 from .problem import ElasticityOptions as ElasticityOptions
 from .problem import PoissonOptions as PoissonOptions
 from .problem import ProblemOptions as ProblemOptions

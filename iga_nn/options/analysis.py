@@ -3,40 +3,28 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING
 
 from ..errors import InputError, input_errors
 from ..type_check import Checked
-from .problem import ElasticityOptions, Formula, PoissonOptions, modulus
+from .problem import modulus
 from .space import check_level, check_space
 
 if TYPE_CHECKING:
     from solve import Elasticity
-    from solve.forms.boundary_value_problem import BoundaryValueProblem
 
 
 @dataclass(frozen=True)
 class StudyOptions(Checked):
-    """Give an exact solution of Poisson's problem, and the trial spaces it is approximated in.
+    """Give the trial spaces in which an exact solution is approximated.
 
     Attributes:
-        exact: the solution, a formula in x, y, z or X, Y, Z (scaled to volume 1 about the middle); exp(X+Z)*sin(Y) by
-            default. A formula that starts with a minus is written --exact=-x.
         degree: one or more degrees; the degree of the map by default.
         refine: levels to solve on, 0 1 2 or 0..2; level n halves every knot span of the map n times.
-        solve_anyway: solve also on a map that folds, or that is too far from its surface to stand for the part.
     """
 
-    exact: Formula | None = None
     degree: tuple[int, ...] = ()
     refine: tuple[str, ...] = ("0..2",)
-    solve_anyway: bool = False
-
-    command: ClassVar[str] = "study"
-
-    def problem(self) -> BoundaryValueProblem:
-        """Return the problem of these options. Raises InputError."""
-        return PoissonOptions(exact=self.exact).problem()
 
     def levels(self) -> list[int]:
         """Return the refinement levels in order. Raises InputError, also for degrees that cannot be run."""
@@ -46,35 +34,6 @@ class StudyOptions(Checked):
         for degree in self.degree or (None,):
             check_space(levels, degree)
         return sorted(levels)
-
-
-@dataclass(frozen=True)
-class ElasticityStudyOptions(StudyOptions):
-    """Give an exact displacement of an elastic body, and the trial spaces it is approximated in.
-
-    Attributes:
-        exact: the displacement, a vector: three formulas in x, y, z or X, Y, Z (scaled to volume 1 about the middle),
-            separated by semicolons, in quotes: "x*y;0;sin(z)".
-        traction: faces with the traction of that displacement; all other faces have the displacement itself.
-        young: Young's modulus E; of several patches also one for each: "p0: 210, p1: 70".
-        poisson_ratio: Poisson's ratio nu, as young.
-    """
-
-    traction: tuple[str, ...] = ()
-    young: float | str = 1.0
-    poisson_ratio: float | str = 0.3
-
-    command: ClassVar[str] = "study elasticity"
-
-    def problem(self) -> BoundaryValueProblem:
-        """Return the problem of these options. Raises InputError."""
-        if given := [entry for entry in self.traction if "=" in entry]:
-            face = given[0].partition("=")[0]
-            raise InputError(f"traction {given[0]}: a study takes that of the exact displacement: write {face} alone")
-        if self.exact is None:
-            raise InputError("no solution to compare with: give the displacement as --exact 'x*y;sin(z);x'")
-        own = ElasticityOptions(self.exact, traction=self.traction, young=self.young, poisson_ratio=self.poisson_ratio)
-        return own.problem()
 
 
 @dataclass(frozen=True)

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable
-from dataclasses import KW_ONLY, dataclass, replace
+from collections.abc import Callable, Mapping
+from dataclasses import KW_ONLY, asdict, dataclass, fields, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
@@ -16,6 +16,7 @@ from .space import check_space
 if TYPE_CHECKING:
     from solve import Elasticity, Poisson, SolveOptions
     from solve.forms.boundary_value_problem import BoundaryValueProblem
+    from solve.forms.conditions import Condition
 
 Formula = str  # one that starts with a minus is written --option=-x
 
@@ -32,13 +33,31 @@ class Units:
 
 
 NO_UNITS = Units()
+UNITS = ("unit", "stress_unit")  # options that are free text and change no number
+
+Row = tuple[str, str]  # a name, and the formula or number; of data of the exact solution, or zero, the number is ""
+
+
+@dataclass(frozen=True)
+class Sheet:
+    """Hold the form of one problem on the live page, beside the options with data on regions.
+
+    title: name of the problem. equation: text above the fields. fields: of each field the option, its label, and the
+    value of an empty field. signs: symbols of options in a line of text.
+    """
+
+    title: str
+    equation: str
+    fields: tuple[tuple[str, str, str], ...]
+    signs: Mapping[str, str]
 
 
 @dataclass(frozen=True)
 class ProblemOptions(Checked, ABC):
     """Hold the options of every PDE of the command line: its exact solution, its meshes, and its quadrature.
 
-    A new PDE is a subclass with options of its own, entered in PROBLEMS.
+    A new PDE is a subclass with options of its own, entered in PROBLEMS. It becomes a command of `run`, `solve`,
+    `study`, `batch` and `app`. An option that lists regions has the name of its class of conditions.
 
     Attributes:
         refine: levels to solve on; level n halves every knot span of the map n times.
@@ -59,14 +78,45 @@ class ProblemOptions(Checked, ABC):
 
     section: ClassVar[str]  # its name on the command line and in report.json
     title: ClassVar[str]
+    essential: ClassVar[Row]  # words on a page, and the option, of values on the faces of the cube
+    natural: ClassVar[Row]  # the same of the flux on faces that are named
+    on_faces: ClassVar[tuple[str, ...]]  # options that list faces of the cube
+    sheet: ClassVar[Sheet]
 
     @abstractmethod
     def problem(self) -> BoundaryValueProblem:
         """Return the problem of these options. Raises InputError."""
 
+    @classmethod
+    @abstractmethod
+    def law_of(cls, section: Mapping[str, Any]) -> list[Row]:
+        """Return the equation and the coefficients of a section of report.json, as a page shows them."""
+
+    @classmethod
+    def on_regions(cls) -> list[str]:
+        """Return the names of the options that list regions with their data."""
+        lists = (field.name for field in fields(cls) if field.type == "tuple[str, ...]")
+        return [name for name in lists if name not in cls.on_faces]
+
+    def conditions(self, components: int) -> list[Condition]:
+        """Return the conditions on regions, of a problem with c components of u. Raises InputError."""
+        from solve.forms.conditions import KINDS
+
+        found = []
+        for name in self.on_regions():
+            kind = KINDS[name]
+            read = partial(texts.datum, kind, kind.entries or components)
+            stated = texts.on_regions(name, getattr(self, name), read)
+            found += [kind.of(region, data) for region, data in stated.items()]
+        return found
+
+    def values(self, *left_out: str) -> dict[str, Any]:
+        """Return the options by name, without those that are named, and without `solve_anyway`, which no number has."""
+        return {name: value for name, value in asdict(self).items() if name not in ("solve_anyway", *left_out)}
+
     def __post_init__(self) -> None:
         super().__post_init__()
-        for name in ("unit", "stress_unit"):
+        for name in UNITS:
             text = getattr(self, name, None)
             if text is not None and not (text.strip() and text.isprintable() and len(text) <= LONGEST_UNIT):
                 flag = "--" + name.replace("_", "-")
@@ -128,11 +178,33 @@ class PoissonOptions(ProblemOptions):
 
     section: ClassVar[str] = "poisson"
     title: ClassVar[str] = "Poisson's equation"
+    essential: ClassVar[Row] = ("u", "boundary")
+    natural: ClassVar[Row] = ("flux κ ∂u/∂n", "neumann")
+    on_faces: ClassVar[tuple[str, ...]] = ("neumann", "robin")
+    sheet: ClassVar[Sheet] = Sheet(
+        title,
+        "−div(κ grad u) + c u = f. Formulas use x, y, z, in the surface's units, or X, Y, Z, scaled to volume 1.",
+        (
+            ("kappa", "Coefficient κ, one formula or six: xx,xy,xz,yy,yz,zz", "1"),
+            ("reaction", "Reaction c", "0"),
+            ("exact", "Exact solution u, from which empty data follow", "none; without a source exp(X+Z)*sin(Y)"),
+            ("source", "Source f", "that of the exact solution"),
+            ("boundary", "Values of u on the faces", "those of the exact solution, or 0"),
+        ),
+        {"kappa": "κ", "reaction": "c", "exact": "u", "source": "f", "boundary": "u on the faces"},
+    )
+
+    @classmethod
+    def law_of(cls, section: Mapping[str, Any]) -> list[Row]:
+        """Return the equation with kappa, the reaction and the source."""
+        reaction = section.get("reaction")
+        rows = [("equation", f"−∇·(κ ∇u){' + c u' if reaction is not None else ''} = f")]
+        rows += [("κ", section.get("kappa", "1")), *([] if reaction is None else [("c", reaction)])]
+        return [*rows, ("f", section.get("source", ""))]
 
     def problem(self) -> Poisson:
         """Return the problem of these options. Raises InputError."""
         from solve import Poisson
-        from solve.forms.conditions import Flux
 
         check_space(self.refine, self.degree)
         robin = {}
@@ -150,9 +222,7 @@ class PoissonOptions(ProblemOptions):
                 reaction=_by_patch("--reaction", self.reaction, str),
                 neumann=texts.faces("neumann", self.neumann),
                 robin=robin,
-                value=texts.on_regions("value", self.value, str),
-                conditions=[Flux(*one) for one in (texts.on_regions("flux", self.flux, str) or {}).items()],
-                exchange=texts.on_regions("exchange", self.exchange, texts.pair),
+                conditions=self.conditions(1),
             )
 
 
@@ -214,6 +284,33 @@ class ElasticityOptions(ProblemOptions):
 
     section: ClassVar[str] = "elasticity"
     title: ClassVar[str] = "linear elasticity"
+    essential: ClassVar[Row] = ("displacement u", "displacement")
+    natural: ClassVar[Row] = ("traction σ n", "traction")
+    on_faces: ClassVar[tuple[str, ...]] = ("traction",)
+    sheet: ClassVar[Sheet] = Sheet(
+        "an elastic body",
+        "−div σ = f, small displacements. Click a face of the part for its region; the rest of its boundary is free.",
+        (
+            ("young", "Young's modulus E", "1"),
+            ("poisson_ratio", "Poisson's ratio ν", "0.3"),
+            ("body_force", "Force per volume, three formulas", "0;0;0"),
+            ("stress_unit", "Unit of stresses, such as MPa", "none"),
+        ),
+        {"young": "E", "poisson_ratio": "ν", "body_force": "f"},
+    )
+
+    @classmethod
+    def law_of(cls, section: Mapping[str, Any]) -> list[Row]:
+        """Return the equation with the material, Lame's constants too if there is one material, and the force."""
+        young, ratio = (section.get(name, getattr(cls, name)) for name in ("young", "poisson_ratio"))
+        said = (f"{value:g}" if isinstance(value, float | int) else value for value in (young, ratio))
+        material = "Young's modulus E = {}, Poisson's ratio ν = {}".format(*said)
+        if not isinstance(young, str) and not isinstance(ratio, str):
+            first, shear = young * ratio / ((1.0 + ratio) * (1.0 - 2.0 * ratio)), young / (2.0 * (1.0 + ratio))
+            material += f"; λ = {first:.6g}, μ = {shear:.6g}"
+        equation = "−∇·σ = f,  σ = λ (∇·u) I + μ (∇u + ∇uᵀ)"
+        force = section.get("body_force", "")
+        return [("equation", equation), ("material", material), ("force f per volume", force)]
 
     def solve_options(self) -> SolveOptions:
         """Return the options of the solve on the finest mesh; a slender body needs more iterations than a scalar."""
@@ -232,7 +329,8 @@ class ElasticityOptions(ProblemOptions):
         loads = self.exact, self.body_force, self.displacement, self.traction, self.load, self.pressure, self.fix
         if not any(loads):
             raise InputError(
-                "no load is given: --load 'nz > 0.9=0;0;-1', --pressure, --body-force '0;0;-1' or --traction"
+                "nothing acts on the body, no load is given: --load 'nz > 0.9=0;0;-1', --pressure, "
+                "--body-force '0;0;-1', --traction or a displacement"
             )
         traction = texts.faces("traction", self.traction)
         with input_errors():
@@ -243,12 +341,7 @@ class ElasticityOptions(ProblemOptions):
                 traction={face: texts.vector(f"--traction {face}", text) for face, text in traction.items()},
                 young=modulus("--young", self.young),
                 poisson_ratio=modulus("--poisson-ratio", self.poisson_ratio),
-                fix=texts.on_regions("fix", self.fix, texts.parts),
-                roller=texts.on_regions("roller", self.roller, str),
-                symmetry=texts.on_regions("symmetry", self.symmetry, str),
-                load=texts.on_regions("load", self.load, partial(texts.vector, "--load")),
-                pressure=texts.on_regions("pressure", self.pressure, str),
-                spring=texts.on_regions("spring", self.spring, str),
+                conditions=self.conditions(3),
             )
             body.demand_held()
             return body

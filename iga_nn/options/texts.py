@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ..errors import InputError
+
+if TYPE_CHECKING:
+    from solve.forms.conditions import Condition
 
 _EQUALS = re.compile("(?<![<>=])=(?!=)")
 _PATCH = re.compile(r"(?:^|,)\s*p(\d+)\s*:")
@@ -24,8 +27,8 @@ def faces(name: str, entries: Sequence[str]) -> dict[str, str | None]:
     return found
 
 
-def on_regions(kind: str, entries: Sequence[str], read: Callable[[str], Any]) -> dict[str, Any] | None:
-    """Return REGION=DATA and REGION entries as a table, None without entries.
+def on_regions(kind: str, entries: Sequence[str], read: Callable[[str], Any]) -> dict[str, Any]:
+    """Return REGION=DATA and REGION entries as a table.
 
     read: the function that converts the text of the data; an entry without data has None. The = of <= and >=, and
     quoted text, belong to the region. Raises InputError for a region with two entries.
@@ -39,21 +42,27 @@ def on_regions(kind: str, entries: Sequence[str], read: Callable[[str], Any]) ->
         if region in found:
             raise InputError(f"{kind}: region {region!r:.80} is given twice")
         found[region] = None if split is None else read(entry[split.end() :].strip())
-    return found or None
+    return found
 
 
-def pair(text: str) -> tuple[str, str]:
-    """Return the factor and the value outside from ALPHA:OUTSIDE. Raises InputError for another text."""
-    factor, colon, outside = text.partition(":")
-    if not (factor.strip() and colon and outside.strip()):
-        raise InputError(f"exchange {text!r:.80}: write REGION=ALPHA:OUTSIDE, such as 'nz > 0.9=25:20'")
-    return factor, outside
+def datum(kind: type[Condition], entries: int, text: str) -> Any:
+    """Return the data of a condition on a region: a formula, a vector, or FACTOR:OUTSIDE. Raises InputError.
 
+    An entry of a vector that is left out leaves the component of a support free.
+    """
+    from solve.forms.conditions import Exchange, Spring
 
-def parts(text: str) -> list[str | None] | None:
-    """Return the formulas of a vector, None for an entry that is left out."""
-    entries = vector("--fix", text)
-    return None if entries is None else [entry if entry.strip() else None for entry in entries]
+    if issubclass(kind, Exchange):
+        factor, colon, outside = text.partition(":")
+        if not colon and issubclass(kind, Spring):
+            return text
+        if not (factor.strip() and outside.strip()):
+            raise InputError(f"{kind.kind} {text!r:.80}: write REGION=ALPHA:OUTSIDE, such as 'nz > 0.9=25:20'")
+        return factor, outside if entries == 1 else vector(f"--{kind.kind}", outside)
+    if entries == 1:
+        return text
+    parts = vector(f"--{kind.kind}", text)
+    return [entry if entry.strip() else None for entry in parts or ()] if kind.is_essential else parts
 
 
 def vector(flag: str, text: str | None) -> list[str] | None:

@@ -16,7 +16,7 @@ from solve.reactions import Balance
 from solve.solution import Solution
 
 from ..figures.evaluate import problems_on
-from ..options import ProblemOptions
+from ..options import UNITS, ProblemOptions
 from ..report import document as reports
 from .output_folder import digest
 
@@ -24,7 +24,6 @@ log = logging.getLogger(__name__)
 
 SOLUTION = "solution.npz"
 _CHECKPOINT = "solve"
-_FREE = ("refine", "unit", "stress_unit", "solve_anyway")  # options that change no number of a level
 
 
 @dataclass
@@ -58,18 +57,17 @@ class Levels:
 class KeptLevels:
     """Keep the levels of a run in a checkpoint, whose solution is the file in the output folder.
 
-    folder: the output folder. checkpoints: those of the run's map. statement: the options of the problem.
+    folder: the output folder. checkpoints: those of the run's map. problem_options: the options of the problem.
     """
 
     folder: Path
     checkpoints: Checkpoints
-    statement: ProblemOptions
+    problem_options: ProblemOptions
 
     @property
     def _asked(self) -> dict[str, Any]:
         """Return the options on which the numbers of a level depend, as plain JSON values."""
-        options = asdict(self.statement).items()
-        return {name: reports.plain(value) for name, value in options if name not in _FREE}
+        return {name: reports.plain(value) for name, value in self.problem_options.values("refine", *UNITS).items()}
 
     def save(self, done: Levels) -> None:
         """Keep the levels whose finest solution the output folder holds."""
@@ -88,7 +86,7 @@ class KeptLevels:
             return Levels()
         _, state = saved
         refine = state["refine"]
-        if state["asked"] != self._asked or refine != sorted(self.statement.refine)[: len(refine)]:
+        if state["asked"] != self._asked or refine != sorted(self.problem_options.refine)[: len(refine)]:
             log.info("the levels that are done are those of another problem: all are solved anew")
             return Levels()
         if state["solution"] != digest(self.folder / SOLUTION):

@@ -243,10 +243,10 @@ def _check_data(problem: BoundaryValueProblem, surface: Surface) -> None:
     """Check the problem's data on the surface, because no points inside are known yet. Raises ExpressionError."""
     problem = problem.placed(frame_of(surface))
     points = surface.vertices.T
-    for evaluate in (problem.source_at, problem.form.tensor, problem.form.mass):
-        evaluate(points)
     if problem.exact is not None:
         problem.exact_at(points)
+    for evaluate in (problem.source_at, problem.form.tensor, problem.form.mass):
+        evaluate(points)
     for _, notice in empty_formulas(problem, points):
         log.warning("%s", notice)
     normals = vertex_normals(surface.vertices, surface.faces)

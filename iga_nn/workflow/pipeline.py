@@ -5,7 +5,7 @@ Every file is written as soon as its content is known, so that a late failure lo
 
 import logging
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import ExitStack, nullcontext
 from dataclasses import asdict, replace
 from itertools import chain, product
@@ -117,15 +117,20 @@ def run(
     >>> [level["dofs"] for level in outcome.report["poisson"]["levels"]], (outcome.folder / "report.html").exists()
     ([216], True)
     """
+    how: dict[str, Any] = {"force": force, "vector": vector, "progress": progress}
+    return parameterize_to(mesh, out, mapping=mapping, problem_options=chosen(problem, given), **how)
+
+
+def chosen(problem: str, given: Mapping[str, ProblemOptions | None]) -> ProblemOptions:
+    """Return the options of a problem from keywords, which have its name. Raises InputError for others."""
     check_type("problem", problem, str)
     if problem not in PROBLEMS:
         raise InputError(f"problem {problem!r}: choose one of {', '.join(PROBLEMS)}")
-    mapping, statement = mapping or MapOptions(), given.pop(problem, None) or PROBLEMS[problem]()
-    check_type(problem, statement, PROBLEMS[problem])
-    if others := [name for name, value in given.items() if value is not None]:
+    if others := [name for name, value in given.items() if value is not None and name != problem]:
         raise InputError(f"{others[0]}: is no option of a run of {problem}; give {problem}=...")
-    how: dict[str, Any] = {"force": force, "vector": vector, "progress": progress}
-    return parameterize_to(mesh, out, mapping=mapping, statement=statement, **how)
+    problem_options = given.get(problem) or PROBLEMS[problem]()
+    check_type(problem, problem_options, PROBLEMS[problem])
+    return problem_options
 
 
 def parameterize_to(
@@ -133,7 +138,7 @@ def parameterize_to(
     out: str | Path | None = None,
     *,
     mapping: MapOptions | None = None,
-    statement: ProblemOptions | None = None,
+    problem_options: ProblemOptions | None = None,
     force: bool = False,
     vector: bool = False,
     progress: ProgressCallback | None = None,
@@ -148,53 +153,59 @@ def parameterize_to(
     check_type("mesh", mesh, str | Path)
     check_type("out", out, str | Path | None)
     check_type("progress", progress, Callable | None)
-    problem, unknowns = (None, 0) if statement is None else checked(mapping, statement)
+    problem, unknowns = (None, 0) if problem_options is None else checked(mapping, problem_options)
     with open_folder(mesh, out, force, mapping.resume, vector) as state, ExitStack() as stack:
         if paints_beside and not state.finished and default_threads() > 1:
             state.painter = stack.enter_context(Painter())
         with state.timed("load"):
             given = read_input(mesh, mapping, state.finished.report if state.finished else None)
-        identity = _identity(given, statement)
+        identity = _identity(given, problem_options)
         if state.finished:
-            return _finished_by(identity, state.finished, vector, statement)
-        known = {"command": _command(mesh, out, mapping, statement), "identity": identity}
+            return _finished_by(identity, state.finished, vector, problem_options)
+        known = {"command": _command(mesh, out, mapping, problem_options), "identity": identity}
         body = kept_map(state, given, known, problem) if mapping.resume else None
         if body is None:
             body = map_surface(state, given, mapping, progress, known, problem, unknowns).volume
-        if statement is None or problem is None or stays_unsolved(state, statement.solve_anyway):
+        if problem_options is None or problem is None or stays_unsolved(state, problem_options.solve_anyway):
             return _finish(state, body)
         problem = with_part(problem, state.folder / "volume.npz")
-        kept = KeptLevels(state.folder, Checkpoints(state.folder / CHECKPOINT, given.identity, resume=True), statement)
-        solution = solve_levels(state, body, problem, statement, statement.solve_options(), kept)
-        return _finish(state, body, solution, problem, statement.units)
+        kept = KeptLevels(
+            state.folder, Checkpoints(state.folder / CHECKPOINT, given.identity, resume=True), problem_options
+        )
+        solution = solve_levels(state, body, problem, problem_options, problem_options.solve_options(), kept)
+        return _finish(state, body, solution, problem, problem_options.units)
 
 
-def _command(mesh: str | Path, out: str | Path | None, mapping: MapOptions, statement: ProblemOptions | None) -> str:
+def _command(
+    mesh: str | Path, out: str | Path | None, mapping: MapOptions, problem_options: ProblemOptions | None
+) -> str:
     """Return the command that repeats such a run."""
-    if statement is None:
+    if problem_options is None:
         return command_line("parameterize", mesh, mapping, out=out)
-    return command_line(f"run {statement.section}", mesh, mapping, statement, out=out)
+    return command_line(f"run {problem_options.section}", mesh, mapping, problem_options, out=out)
 
 
-def _identity(given: MapInput, statement: ProblemOptions | None) -> dict[str, Any]:
+def _identity(given: MapInput, problem_options: ProblemOptions | None) -> dict[str, Any]:
     """Return the identity of a run, as plain JSON values: that of its map, and the options of its problem."""
-    return reports.plain(given.identity | ({} if statement is None else {statement.section: _choices(statement)}))
+    return reports.plain(
+        given.identity | ({} if problem_options is None else {problem_options.section: problem_options.values()})
+    )
 
 
-def _choices(statement: ProblemOptions) -> dict[str, Any]:
-    """Return the options that shape a solution."""
-    return {name: value for name, value in asdict(statement).items() if name != "solve_anyway"}
-
-
-def checked(mapping: MapOptions, statement: ProblemOptions) -> tuple[BoundaryValueProblem, int]:
+def checked(mapping: MapOptions, problem_options: ProblemOptions) -> tuple[BoundaryValueProblem, int]:
     """Return the problem of a run and its number of unknowns on the finest mesh. Raises InputError."""
-    problem, degree = statement.problem(), mapping.config().spline.degree
+    problem, degree = problem_options.problem(), mapping.config().spline.degree
     blank = BSplineVolume.uniform(np.zeros((mapping.most_control_points,) * 3 + (3,)), degree)
-    return problem, check_size(blank, max(statement.refine), statement.degree, problem.form.components)
+    return problem, check_size(blank, max(problem_options.refine), problem_options.degree, problem.form.components)
 
 
 def finished_run(
-    mesh: str | Path, out: str | Path, mapping: MapOptions, statement: ProblemOptions | None, *, vector: bool = False
+    mesh: str | Path,
+    out: str | Path,
+    mapping: MapOptions,
+    problem_options: ProblemOptions | None,
+    *,
+    vector: bool = False,
 ) -> Outcome | None:
     """Return the finished result of `parameterize_to` in its folder, None where there is none.
 
@@ -203,15 +214,15 @@ def finished_run(
     report = reports.read(Path(out))
     if report is None or not reports.is_finished(report):
         return None
-    identity = _identity(read_input(mesh, mapping, report), statement)
-    return _finished_by(identity, Outcome(Path(out), report), vector, statement)
+    identity = _identity(read_input(mesh, mapping, report), problem_options)
+    return _finished_by(identity, Outcome(Path(out), report), vector, problem_options)
 
 
 def solve_to(
     volume: str | Path,
     out: str | Path | None = None,
     *,
-    statement: ProblemOptions | None = None,
+    problem_options: ProblemOptions | None = None,
     force: bool = False,
     vector: bool = False,
     device: str = "cpu",
@@ -224,11 +235,11 @@ def solve_to(
     folder, the others return None. The other options and the errors are those of `run`.
     """
     check_type("volume", volume, str | Path)
-    statement, path = statement or PoissonOptions(), Path(volume)
+    problem_options, path = problem_options or PoissonOptions(), Path(volume)
     if comm is not None and device != "cpu":
         raise InputError(f"device {device!r}: --mpi runs on the CPU; leave one of them out")
-    problem = with_part(statement.problem(), path)
-    loaded, options = load_volume(path), replace(statement.solve_options(), device=device, comm=comm)
+    problem = with_part(problem_options.problem(), path)
+    loaded, options = load_volume(path), replace(problem_options.solve_options(), device=device, comm=comm)
     processes = 1 if comm is None else comm.size
     if comm is not None and processes == 1:
         log.warning("--mpi in a single process: `mpiexec -n 4 iga-nn solve ... --mpi` takes four")
@@ -238,7 +249,7 @@ def solve_to(
         check_device(device, problem)
     tell_memory(loaded, problem, options)
     how: dict[str, Any] = {"device": device} if device != "cpu" else {"mpi": True} if comm is not None else {}
-    command = command_line(f"solve {statement.section}", path, statement, **how, out=out)
+    command = command_line(f"solve {problem_options.section}", path, problem_options, **how, out=out)
     with ExitStack() as stack:
         with agreed(comm) if comm is not None else nullcontext():  # no process waits for one whose folder is refused
             state = None
@@ -246,15 +257,15 @@ def solve_to(
                 state = stack.enter_context(open_folder(path, out, force, vector=vector))
                 state.begin("solution")
                 write_certificate(state, path, loaded, command)
-        unsolved = state is not None and stays_unsolved(state, statement.solve_anyway)
+        unsolved = state is not None and stays_unsolved(state, problem_options.solve_anyway)
         unsolved = unsolved if comm is None else comm.bcast(unsolved)
         if unsolved:
             return None if state is None else _finish(state, loaded)
         if state is None:
-            deque(each_level(loaded, problem, statement.refine, options), maxlen=0)
+            deque(each_level(loaded, problem, problem_options.refine, options), maxlen=0)
             return None
-        solution = solve_levels(state, loaded, problem, statement, options)
-        return _finish(state, loaded, solution, problem, statement.units)
+        solution = solve_levels(state, loaded, problem, problem_options, options)
+        return _finish(state, loaded, solution, problem, problem_options.units)
 
 
 def with_part(problem: BoundaryValueProblem, volume: Path) -> BoundaryValueProblem:
@@ -277,17 +288,26 @@ def study_to(
     volume: str | Path,
     out: str | Path | None = None,
     *,
+    problem_options: ProblemOptions | None = None,
     study_options: StudyOptions | None = None,
     force: bool = False,
     vector: bool = False,
 ) -> tuple[Outcome, str]:
     """Make a convergence study on a saved volume; return the output folder with its report, and the table.
 
-    The other options and the errors are those of `run`.
+    problem_options: the problem, with its exact solution; its meshes are those of `study_options`. The other options
+    and the errors are those of `run`.
     """
     check_type("volume", volume, str | Path)
     study_options, path = study_options or StudyOptions(), Path(volume)
-    problem, levels = study_options.problem(), study_options.levels()
+    problem_options = problem_options or PoissonOptions()
+    levels, is_known = (
+        study_options.levels(),
+        bool(problem_options.exact) or isinstance(problem_options, PoissonOptions),
+    )
+    problem = problem_options.problem() if is_known else None
+    if problem is None or problem.exact is None:
+        raise InputError("no solution to compare with: give it as --exact 'x*y', of a body as --exact 'x*y;sin(z);x'")
     loaded = load_volume(path)
     degrees = sorted(study_options.degree) or [max(max(patch.degrees) for patch in as_body(loaded))]
     for degree in degrees:
@@ -296,10 +316,11 @@ def study_to(
         check_problem(loaded, problem)
     with open_folder(path, f"{default_folder(path)}-study" if out is None else out, force, vector=vector) as state:
         state.begin("study")
-        write_certificate(state, path, loaded, command_line(study_options.command, path, study_options, out=out))
-        if stays_unsolved(state, study_options.solve_anyway):
+        command = "study" if isinstance(problem_options, PoissonOptions) else f"study {problem_options.section}"
+        write_certificate(state, path, loaded, command_line(command, path, problem_options, study_options, out=out))
+        if stays_unsolved(state, problem_options.solve_anyway):
             return _finish(state, loaded), ""
-        known = described(problem, loaded) | ({"exact": study_options.exact} if study_options.exact else {})
+        known = described(problem, loaded) | ({"exact": problem_options.exact} if problem_options.exact else {})
         study: dict[int, list[ConvergenceRow]] = {}
 
         def missing() -> str:
@@ -366,7 +387,7 @@ def modes_to(
 
 
 def _finished_by(
-    identity: dict[str, Any], finished: Outcome, vector: bool, statement: ProblemOptions | None
+    identity: dict[str, Any], finished: Outcome, vector: bool, problem_options: ProblemOptions | None
 ) -> Outcome:
     """Return the finished result that a resumed run of this identity finds.
 
@@ -374,9 +395,13 @@ def _finished_by(
     """
     folder, made_by, known = finished.folder, finished.report.get("command", ""), finished.report.get("identity")
     unfit = reports.why_not_solved(finished.report)
-    if statement is not None and statement.section not in finished.report and (statement.solve_anyway or not unfit):
+    if (
+        problem_options is not None
+        and problem_options.section not in finished.report
+        and (problem_options.solve_anyway or not unfit)
+    ):
         path, anyway = folder / "volume.npz", " --solve-anyway" if unfit else ""
-        command = f"iga-nn solve {statement.section} {path}{anyway}"
+        command = f"iga-nn solve {problem_options.section} {path}{anyway}"
         raise InputError(f"{folder}: holds a finished volume; `{command}` solves on it")
     if known is None or (names := differing(identity, known)):
         why = ", whose report has no identity" if known is None else f" (different: {', '.join(names)})"

@@ -24,14 +24,12 @@ from .output_folder import RunFolder
 
 log = logging.getLogger(__name__)
 
-NOT_SHOWN = ("refine", "degree", "solve_anyway")  # options of a problem that its section of the report leaves out
-
 
 def solve_levels(
     state: RunFolder,
     body: BodyLike,
     problem: BoundaryValueProblem,
-    statement: ProblemOptions,
+    problem_options: ProblemOptions,
     options: SolveOptions,
     kept: KeptLevels | None = None,
 ) -> Solution:
@@ -43,37 +41,36 @@ def solve_levels(
     """
     options = replace(options, certified=verdict_of(state))
     done = kept.load(body, problem) if kept else Levels()
-    left = sorted(statement.refine)[len(done.refine) :]
+    left = sorted(problem_options.refine)[len(done.refine) :]
     if done.refine:
-        state.write(**{statement.section: section_of(statement, problem, body, done)})
+        state.write(**{problem_options.section: section_of(problem_options, problem, body, done)})
     if problem.form.components == 1:
         options = replace(options, start=done.finest)
 
     def show() -> tuple[Any, ...]:
-        return _show(state, body, done, problem, statement) if done.refine else ()
+        return _show(state, body, done, problem, problem_options) if done.refine else ()
 
-    with reported(state, body, lambda: done.missing(statement.refine), show), state.timed("solve"):
+    with reported(state, body, lambda: done.missing(problem_options.refine), show), state.timed("solve"):
         for level, solution in zip(left, each_level(body, problem, left, options), strict=True):
             entry = level_of(solution)
             solution.save(state.folder / SOLUTION)
             done.add(level, entry, solution)
-            state.write(**{statement.section: section_of(statement, problem, body, done)})
+            state.write(**{problem_options.section: section_of(problem_options, problem, body, done)})
             if kept and is_finite(solution):
                 kept.save(done)
-    for notice in _growth(statement, problem, done):
+    for notice in _growth(problem_options, problem, done):
         log.warning("%s", notice)
-    _show(state, body, done, problem, statement)
+    _show(state, body, done, problem, problem_options)
     assert done.finest is not None  # there is one level at least
     return done.finest
 
 
 def section_of(
-    statement: ProblemOptions, problem: BoundaryValueProblem, body: BodyLike, done: Levels
+    problem_options: ProblemOptions, problem: BoundaryValueProblem, body: BodyLike, done: Levels
 ) -> dict[str, Any]:
     """Return the section of report.json on a problem and the levels that are done."""
-    asked = {name: given for name, given in asdict(statement).items() if name not in NOT_SHOWN}
-    known = asked | described(problem, body)
-    notices = [*notices_of(done.reports), *_growth(statement, problem, done)]
+    known = problem_options.values("refine", "degree") | described(problem, body)
+    notices = [*notices_of(done.reports), *_growth(problem_options, problem, done)]
     return (
         {name: value for name, value in known.items() if value is not None and value != ()}
         | ({"regions": regions_of(problem, done.reports[-1])} if problem.conditions else {})
@@ -81,21 +78,21 @@ def section_of(
     )
 
 
-def _growth(statement: ProblemOptions, problem: BoundaryValueProblem, done: Levels) -> list[str]:
+def _growth(problem_options: ProblemOptions, problem: BoundaryValueProblem, done: Levels) -> list[str]:
     """Return the notices on what grows from level to level; none where the exact solution is known."""
-    return growth_notices({**asdict(statement), "levels": done.entries}) if problem.exact is None else []
+    return growth_notices({**asdict(problem_options), "levels": done.entries}) if problem.exact is None else []
 
 
 def _show(
-    state: RunFolder, body: BodyLike, done: Levels, problem: BoundaryValueProblem, statement: ProblemOptions
+    state: RunFolder, body: BodyLike, done: Levels, problem: BoundaryValueProblem, problem_options: ProblemOptions
 ) -> tuple[Solution, BoundaryValueProblem, Units]:
     """Draw the finest solution, write it for ParaView, and return what its view takes."""
     assert done.finest is not None
-    _draw(state, body, done, problem, statement.units)
+    _draw(state, body, done, problem, problem_options.units)
     if len(problem.dirichlet) < 6 or problem.patch_faces:  # the user names faces: show which is which
         state.draw("solution", named_volume=body)
     _write_cells(state, done.finest)
-    return done.finest, problem, statement.units
+    return done.finest, problem, problem_options.units
 
 
 def level_of(solution: Solution) -> dict[str, Any]:

@@ -79,7 +79,7 @@ class Condition:
         object.__setattr__(self, "parsed", {})
 
     @classmethod
-    def of(cls, region: Region, data: Any, name: str = "") -> Self:
+    def of(cls, region: Region | str, data: Any, name: str = "") -> Self:
         """Return the condition from the data of a keyword. Raises ValueError for data of another kind."""
         return cls(region, data, name=name)
 
@@ -331,7 +331,7 @@ class Exchange(Condition):
         super().__init__(region, outside, factor=alpha, name=name)
 
     @classmethod
-    def of(cls, region: Region, data: Any, name: str = "") -> Self:
+    def of(cls, region: Region | str, data: Any, name: str = "") -> Self:
         """Return the condition from the pair of a keyword. Raises ValueError for anything else."""
         if not isinstance(data, tuple | list) or len(data) != 2 or data[0] is None:
             role = name or f"{cls.kind} {str(region)!r}"
@@ -379,7 +379,7 @@ class Spring(Exchange):
         super().__init__(region, alpha, outside, name=name)
 
     @classmethod
-    def of(cls, region: Region, data: Any, name: str = "") -> Self:
+    def of(cls, region: Region | str, data: Any, name: str = "") -> Self:
         """Return the condition from the factor of a keyword, or from its pair."""
         return super().of(region, data if isinstance(data, tuple | list) else (data, 0.0), name)
 
@@ -390,6 +390,7 @@ class Spring(Exchange):
         return _joined(self.factor) if is_zero else super().text
 
 
+KINDS = {name.lower(): globals()[name] for name in __all__}  # by the name of an option
 OF_SCALARS = {"value": Value, "inflow": Flux, "exchange": Exchange}  # by keyword; those of Poisson and Problem
 OF_BODIES = {kind.kind: kind for kind in (Fix, Roller, Symmetry, Load, Pressure, Spring)}
 
