@@ -9,7 +9,7 @@ from parameterize.certificate.body import certify
 from parameterize.certificate.boundary import check_boundary
 from parameterize.compilation import compilation_told
 from parameterize.quality.proved import proved
-from parameterize.spline.body import Body, BodyLike, as_body
+from parameterize.spline.body import BodyLike, as_body
 
 from ..options import MapOptions
 from ..report import advice
@@ -20,8 +20,9 @@ from .output_folder import RunFolder, digest
 log = logging.getLogger(__name__)
 
 
-def certified_facts(body: Body) -> dict[str, Any]:
+def certified_facts(volume: BodyLike) -> dict[str, Any]:
     """Certify a body and return the section `parameterization` of report.json."""
+    body = as_body(volume)
     with compilation_told():
         certificate = certify(body)
         facts = proved(body, certificate, check_boundary(body))
@@ -43,7 +44,7 @@ def write_certificate(state: RunFolder, path: Path, body: BodyLike, command: str
 
 def facts_of_file(path: Path, body: BodyLike) -> dict[str, Any]:
     """Certify a saved body; return the section `parameterization`, with how far it is from the surface of its run."""
-    facts = certified_facts(as_body(body))
+    facts = certified_facts(body)
     return facts | _measured_beside(path, facts)
 
 
