@@ -172,6 +172,8 @@ def modes(
             f"modes: residual {found.worst:.1e} after {found.iterations} iterations, tolerance {tolerance:.0e}: "
             f"{'; '.join(notices) or remedy}"
         )
+    if law.loads:
+        notices = (*notices, f"loads do not matter to vibrations: {', '.join(law.loads)}")
     for notice in notices:
         log.warning("%s", notice)
     omega = np.sqrt(found.values / density)

@@ -92,6 +92,8 @@ def test_density_and_units():
         poisson_ratio=0.0,
     )
     heavy = iga_nn.modes(volume, moved, 15600.0, n=2)
+    assert "loads do not matter to vibrations: body_force" in heavy.notices
+    assert not any("loads" in notice for notice in light.notices)
     assert heavy.frequencies == pytest.approx(light.frequencies / np.sqrt(2.0), rel=1e-8)
     assert np.abs(heavy.shapes[0].grid([0.0], [0.3, 0.6], [0.2])).max() < 1e-15
     assert "mode  frequency" in str(light)

@@ -4,6 +4,7 @@ from dataclasses import fields, replace
 
 import pytest
 
+from iga_nn.cli.commands import main
 from iga_nn.errors import InputError
 from iga_nn.options import (
     PROBLEMS,
@@ -13,6 +14,7 @@ from iga_nn.options import (
     StudyOptions,
     WorkerOptions,
 )
+from solve.study import benchmark_volume
 
 NOT_TOLD = {"unit", "stress_unit", "solve_anyway"}  # but to the reader, and to the run
 SPACE = {"refine": (2,), "degree": 2, "quadrature": "gauss"}
@@ -61,6 +63,28 @@ def test_shared_options_leave_the_order_of_the_own_ones():
 
 def test_every_problem_is_tested_here():
     assert {type(options) for options in OTHERS} == set(PROBLEMS.values())
+
+
+@pytest.mark.parametrize("group", ["run", "solve", "study", "batch", "app"])
+@pytest.mark.parametrize("problem", PROBLEMS)
+def test_every_problem_is_a_command_of_each_group(group, problem, capsys):
+    assert main([group, problem, "--help"]) == 0
+    said, kind = capsys.readouterr().out, PROBLEMS[problem]
+    for name in (*kind.on_regions(), *kind.on_faces):
+        assert f"--{name} " in said
+
+
+def test_a_batch_and_a_study_of_a_body_ask_for_its_data(in_folder, capsys):
+    assert main(["batch", "elasticity", "cube", "--out", "out"]) == 2
+    assert "nothing acts on the body" in capsys.readouterr().err
+    benchmark_volume(2).save("map.npz")
+    assert main(["study", "map.npz", "--source", "1"]) == 2
+    assert "no solution to compare with" in capsys.readouterr().err
+
+
+def test_a_spring_has_a_value_outside_on_the_command_line_too():
+    options = ElasticityOptions(spring=("u0=7", "v0=x:0;0;1"), load=("u1=0;0;1",))
+    assert [one.text for one in options.problem().conditions] == ["0;0;1", "7", "x, outside 0;0;1"]
 
 
 def test_auto_takes_its_limits_to_the_map():

@@ -169,6 +169,12 @@ class BoundaryValueProblem:
         return {datum.name: set(datum.patches) for _, datum in self._datums if isinstance(datum, ByPatch)}
 
     @property
+    def loads(self) -> list[str]:
+        """Return the names of the source and of the fluxes that are given, without those that are zero."""
+        acting = (one.datum for one in self._all if not one.is_support)
+        return [datum.name for datum in (self.data.get("source"), *acting) if datum is not None and not datum.is_zero]
+
+    @property
     def places(self) -> list[tuple[str, str]]:
         """Return the kind and the region of each condition."""
         return [(condition.kind, condition.region.text) for condition in self._all]

@@ -49,6 +49,12 @@ class Datum:
         """Return whether all derivatives of the datum are known, as for formulas without where, min and max."""
         return len(self.formulas) == len(self.entries) and all(formula.is_smooth for formula in self.formulas)
 
+    @property
+    def is_zero(self) -> bool:
+        """Return whether all entries are formulas of the constant zero."""
+        constant = [entry for entry in self.formulas if not entry.variables and not np.any(entry(*np.zeros((3, 1))))]
+        return len(constant) == len(self.entries)
+
     def placed(self, frame: UnitFrame) -> "Datum":
         """Return the same datum with X, Y, Z measured in a frame."""
         return replace(self, entries=tuple(e.placed(frame) if isinstance(e, Expression) else e for e in self.entries))
