@@ -12,7 +12,7 @@ from parameterize.arrays import Array, Knots
 from parameterize.display import Brief
 from parameterize.files import array_names, load_arrays, save_arrays
 from parameterize.quality.distances import nearest_on_boundary
-from parameterize.spline.body import Body, BodyLike, all_control_points
+from parameterize.spline.body import Body, BodyLike, all_control_points, as_body
 from parameterize.spline.bspline import evaluate_at, evaluate_grid
 from parameterize.spline.sampled_boundary import SampledBoundary
 from parameterize.spline.volume import BSplineVolume, checked_knots, load_spline, save_spline
@@ -65,12 +65,7 @@ class FieldOnBody:
     @property
     def on_body(self) -> Body:
         """Return the body of the function. Raises ValueError where it is unknown."""
-        volumes = [patch.geometry for patch in self.patches]
-        if any(volume is None for volume in volumes):
-            raise ValueError(
-                "points in space require a field with a volume: dataclasses.replace(field, geometry=volume)"
-            )
-        return Body(tuple(volume for volume in volumes if volume is not None))
+        raise NotImplementedError
 
     def probe(self, points: ArrayLike, *, clip: bool = False) -> Array:
         """Return the values (m,) or (m, c) at points (m, 3) in space, in the body's units; NaN outside of the body.
@@ -100,9 +95,10 @@ class FieldOnBody:
         """Return the values (...) or (c, ...) at points x (3, ...) of the solver, as a law or a datum receives them."""
         raise NotImplementedError
 
-    def fits(self, body: Body) -> bool:
+    def fits(self, body: BodyLike) -> bool:
         """Return whether the field may be a datum on a body: its own patches are those of the body, or unknown."""
-        return len(self.patches) == len(body) and all(map(_is_on, self.patches, body))
+        patches = as_body(body).patches
+        return len(self.patches) == len(patches) and all(map(_is_on, self.patches, patches))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -154,6 +150,15 @@ class SplineField(Brief, FieldOnBody):
     def patches(self) -> "tuple[SplineField, ...]":
         """Return the field itself, that of the only patch."""
         return (self,)
+
+    @property
+    def on_body(self) -> Body:
+        """Return the volume as a body. Raises ValueError where it is unknown."""
+        if self.geometry is None:
+            raise ValueError(
+                "points in space require a field with a volume: dataclasses.replace(field, geometry=volume)"
+            )
+        return as_body(self.geometry)
 
     def grid(self, u: ArrayLike, v: ArrayLike, w: ArrayLike) -> Array:
         """Return the values (len(u), len(v), len(w)) or (.., c) on a tensor grid of parameters."""
@@ -221,7 +226,10 @@ class BodyField(Brief, FieldOnBody):
     @property
     def on_body(self) -> Body:
         """Return the body of the function. Raises ValueError where it is unknown."""
-        return super().on_body if self.body is None else self.body
+        volumes = [patch.geometry for patch in self.patches if patch.geometry is not None]
+        if self.body is None and len(volumes) < len(self.patches):
+            raise ValueError("points in space require a field with a body: dataclasses.replace(field, body=body)")
+        return self.body or Body(tuple(volumes))
 
     @property
     def is_single(self) -> bool:

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from parameterize.arrays import Array, IntArray
-from parameterize.spline.body import Body, as_body
+from parameterize.spline.body import Body, BodyLike, as_body
 from parameterize.spline.bspline import breakpoints, gauss_points
 from parameterize.spline.interface import axis_side
 from parameterize.spline.orientation import exact_points
@@ -23,7 +23,7 @@ from .solution import PatchSolution, Solution
 
 Integrand = Quantity | Callable[[Points], ArrayLike]
 Patch = BSplineVolume | PatchSolution
-Domain = Patch | Body | Solution
+Domain = BodyLike | PatchSolution | Solution
 
 
 def integrate(
@@ -112,7 +112,9 @@ def resultant(solution: Solution, over: Regions) -> Array:
 
 def _patches(body: Domain) -> Sequence[Patch]:
     """Return the patches of a body, or the solutions on them."""
-    return body.patches if isinstance(body, Body | Solution) else (body,)
+    if isinstance(body, PatchSolution):
+        return (body,)
+    return body.patches if isinstance(body, Solution) else as_body(body).patches
 
 
 def _maps(body: Domain) -> Body:

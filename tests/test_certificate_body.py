@@ -112,3 +112,14 @@ def test_bad_arguments():
         certify(frame(), max_depth=-1)
     with pytest.raises(TypeError, match="must be a BSplineVolume"):
         certify([LEFT])
+
+
+def test_the_certificate_of_a_volume_has_what_is_known_of_its_patch():
+    found = certify(LEFT)
+    (patch,) = found.patches
+    names = ("lower_bound", "mean_det", "witness", "unproved", "flat", "left_handed", "orientation", "claim")
+    assert all(getattr(found, name) is getattr(patch, name) for name in names)
+    assert str(found) == f"certified, |det J| >= {found.lower_bound:.3g} of its mean"
+    two = certify(Body.from_patches(cells([(0, 0, 0), (1, 0, 0)])))
+    with pytest.raises(ValueError, match=r"that of 2 patches: use certificate.patches\[i\]"):
+        _ = two.witness

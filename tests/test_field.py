@@ -2,10 +2,11 @@
 
 import numpy as np
 import pytest
+from cube_grids import ring, two
 
 import iga_nn
 from solve import benchmark_volume
-from solve.field import SplineField
+from solve.field import BodyField, SplineField
 
 
 @pytest.fixture(scope="module")
@@ -53,3 +54,46 @@ def test_a_field_without_a_volume_says_so():
     volume = benchmark_volume(2)
     with pytest.raises(ValueError, match="geometry=volume"):
         SplineField(volume.degrees, volume.knots, volume.control_points[..., 0]).probe([[0.0, 0.0, 0.0]])
+
+
+def test_a_solution_on_one_patch_has_the_parts_of_its_spline(solution):
+    (patch,) = solution.patches
+    places = [[0.2, 0.4, 0.6], [0.9, 0.1, 0.5]]
+    assert solution.coefficients is patch.coefficients and solution.degrees == patch.degrees == (3, 3, 3)
+    assert solution.knots is patch.knots and isinstance(solution.geometry, iga_nn.BSplineVolume)
+    assert np.array_equal(solution(places), patch(places))
+    assert np.array_equal(solution.grid([0.1], [0.2], [0.3]), patch.grid([0.1], [0.2], [0.3]))
+    assert np.array_equal(solution.quantity("gradient", places), patch.quantity("gradient", places))
+    assert solution.quantity_grid("gradient", [0.1], [0.2], [0.3]).shape == (1, 1, 1, 1, 3)
+
+
+def test_a_solution_on_several_patches_names_the_way_to_one():
+    solution = iga_nn.solve(two(), iga_nn.Poisson(exact="x"))
+    assert isinstance(solution.geometry, iga_nn.Body)
+    for ask in (
+        lambda: solution.coefficients,
+        lambda: solution([[0.5, 0.5, 0.5]]),
+        lambda: solution.grid([0], [0], [0]),
+    ):
+        with pytest.raises(ValueError, match=r"this field has 2 patches: use field.patches\[i\], or probe"):
+            ask()
+
+
+def test_points_outside_of_several_patches_take_the_nearest_value():
+    solution = iga_nn.solve(two(), iga_nn.Poisson(exact="x"))
+    points = [[-1.0, 0.5, 0.5], [0.25, 2.0, 0.5], [1.75, 0.5, -3.0]]
+    assert np.isnan(solution.probe(points)).all()
+    np.testing.assert_allclose(solution.probe(points, clip=True), [0.0, 0.25, 1.75], atol=1e-6)
+
+
+@pytest.mark.parametrize("body", [benchmark_volume(2), two(), ring()], ids=["one", "two", "ring"])
+def test_a_file_of_a_solution_gives_its_field(body, tmp_path):
+    solution = iga_nn.solve(body, iga_nn.Poisson(exact="x"))
+    solution.save(tmp_path / "solution.npz")
+    names = set(np.load(tmp_path / "solution.npz"))
+    assert ("coefficients" in names) == isinstance(body, iga_nn.BSplineVolume)
+    found = BodyField.load(tmp_path / "solution.npz")
+    for patch, own in zip(solution.patches, found.patches, strict=True):
+        assert np.array_equal(patch.coefficients, own.coefficients)
+    with pytest.raises(ValueError, match=r"a field with a body: dataclasses.replace\(field, body=body\)"):
+        found.probe([[0.5, 0.5, 0.5]])

@@ -140,7 +140,8 @@ def test_errors_of_any_size_are_drawn(size, tmp_path, small_views):
         pytest.skip(f"VTK cannot draw on this machine; remedy: {rendering.REMEDY}")
     volume = benchmark_volume(1)
     solution = solve.solve_problem(volume, solve.Poisson(source="0"))
-    field = replace(solution, coefficients=np.full(solution.coefficients.shape, size))
+    (patch,) = solution.patches
+    field = replace(solution, patches=(replace(patch, coefficients=np.full(patch.coefficients.shape, size)),))
     zero = solve.Poisson(exact="0")
     draw_error(tmp_path / "error.png", volume, field, zero)
     draw_values(tmp_path / "values.png", volume, field, "u")

@@ -11,7 +11,7 @@ from cube_grids import box, frame, plate, ring, two
 
 import iga_nn
 from iga_nn import Body, BSplineVolume, Interface
-from parameterize.spline.body import shared_numbers
+from parameterize.spline.body import as_body, shared_numbers
 from parameterize.spline.bspline import greville
 from parameterize.spline.interface import face_layer
 
@@ -163,3 +163,19 @@ def test_points_of_patches_are_what_locate_finds():
         body.points([0, 8], places[:2])
     with pytest.raises(ValueError, match=r"got shapes \(2,\) and \(3, 3\)"):
         body.points([0, 1], places)
+
+
+def test_a_volume_is_a_body_of_one_patch():
+    volume = box((0, 0, 0))
+    body = as_body(volume)
+    assert body.is_single and body.only is volume and body.simplest is volume and as_body(body) is body
+    assert body.face_name(0, "u0") == "u0" and body.size == 1.0 and body.numbering[1] == volume.control_points.size // 3
+
+
+def test_several_patches_and_a_ring_are_no_image_of_a_cube():
+    body = two()
+    assert not body.is_single and body.simplest is body and body.face_name(1, "u1") == "p1_u1"
+    with pytest.raises(ValueError, match=r"this body has 2 patches: use body.patches\[i\]"):
+        _ = body.only
+    glued = ring()
+    assert not glued.is_single and glued.only is glued.patches[0] and glued.face_name(0, "v0") == "p0_v0"

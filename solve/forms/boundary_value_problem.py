@@ -10,7 +10,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from parameterize.arrays import Array
-from parameterize.spline.body import Body, BodyLike, as_body
+from parameterize.spline.body import Body, BodyLike
 from parameterize.spline.volume import FACE_NAMES
 
 from ..field import FieldOnBody
@@ -152,7 +152,7 @@ class BoundaryValueProblem:
         The middle is that of the bounding box. Raises ValueError for a field of another volume.
         """
         for _, datum in self._datums:
-            if not all(entry.fits(as_body(body)) for entry in datum.entries if isinstance(entry, FieldOnBody)):
+            if not all(entry.fits(body) for entry in datum.entries if isinstance(entry, FieldOnBody)):
                 raise ValueError(
                     f"{datum.name}: the field was found on another volume; give one of the volume that is solved on"
                 )
