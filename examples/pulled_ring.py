@@ -23,7 +23,7 @@ import numpy as np
 from common import draw
 
 import iga_nn
-from iga_nn.figures.blocks import draw_blocks
+from iga_nn.figures.map import draw_blocks
 from iga_nn.figures.render import can_draw
 from parameterize import surface_from_arrays
 

@@ -19,11 +19,10 @@ import numpy as np
 
 import iga_nn
 from iga_nn.cli.commands import main as iga_nn_main
-from iga_nn.figures.evaluate import SECTIONS
-from iga_nn.figures.fields import error_of, points_of
-from iga_nn.figures.ranges import error_range
+from iga_nn.figures.colors import error_range
+from iga_nn.figures.fields import SECTIONS, error_of, points_of
 from iga_nn.figures.render import Patch, can_draw, draw, widest_view
-from iga_nn.figures.style import PANEL, color_bar, colors, panels_of, save
+from iga_nn.figures.style import PANEL, color_bar, panels_of, save
 from iga_nn.report.document import read
 from solve import Solution
 
@@ -61,7 +60,7 @@ def draw_errors(
         for panel, title, shown in zip(row, ("boundary", *SECTIONS), (slice(6), *range(6, 9)), strict=True):
             whole = isinstance(shown, slice)
             chosen = range(6) if isinstance(shown, slice) else (shown,)
-            patches = [Patch(points[i], colors(field.patches[i], limits), lit=False) for i in chosen]
+            patches = [Patch(points[i], limits.colors(field.patches[i]), lit=False) for i in chosen]
             cloud = np.concatenate([patch.points.reshape(-1, 3) for patch in patches])
             panel.imshow(draw(patches, widest_view(cloud, tilt=0.45 if whole else 0.0), PANEL))
             panel.set_title(title, fontsize=13)

@@ -202,8 +202,7 @@ def in_this_process(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.fixture
 def small_views(monkeypatch: pytest.MonkeyPatch) -> None:
     """Let VTK draw a tenth of the pixels, of coarser patches: without a graphics card they are what a figure costs."""
-    for module in ("map", "style", "solution", "inside"):
-        monkeypatch.setattr(f"iga_nn.figures.{module}.PANEL", (300, 233))
+    monkeypatch.setattr("iga_nn.figures.style.PANEL", (300, 233))
     for module in ("map", "fields"):
         monkeypatch.setattr(f"iga_nn.figures.{module}.SAMPLES", 31)
     monkeypatch.setattr("iga_nn.figures.fields.OF_SEVERAL", (21, 9))

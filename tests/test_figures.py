@@ -13,9 +13,8 @@ from matplotlib.image import imread
 
 import solve
 from iga_nn.cli.commands import main
-from iga_nn.figures import curves, fields
+from iga_nn.figures import colors, curves, fields
 from iga_nn.figures import cutaway as octant
-from iga_nn.figures import evaluate as sampling
 from iga_nn.figures import map as map_figures
 from iga_nn.figures import render as rendering
 from iga_nn.figures import solution as solution_figures
@@ -109,7 +108,7 @@ def test_fields_in_figures_have_the_colours_of_the_bar(tmp_path, drawing, small_
     image = imread(tmp_path / "solution.png")[..., :3]
     panels = image[:, : int(0.8 * image.shape[1])].reshape(-1, 3)
     colored = panels[np.ptp(panels, axis=1) > 0.1]
-    table = colormaps[sampling.MAP](np.arange(256))[:, :3]
+    table = colormaps[colors.MAP](np.arange(256))[:, :3]
     off = np.array([np.abs(table - pixel).max(axis=1).min() for pixel in colored[::23]])
     assert len(off) > 1000 and np.mean(off < 0.03) > 0.75  # the others lie on lines and at the rim
     assert bar_of(figure).get_ylabel() == "u"
@@ -137,7 +136,7 @@ def test_lines_leave_the_faces_their_colours(tmp_path, drawing):
     volume = benchmark_volume(2)
     map_figures.draw_faces(tmp_path / "faces.png", volume)
     map_figures.draw_lines(tmp_path / "lines.png", volume)
-    assert all(hue_share(tmp_path / "lines.png", color) > 0.01 for color in sampling.FACE_COLORS)
+    assert all(hue_share(tmp_path / "lines.png", color) > 0.01 for color in colors.FACE_COLORS)
     faces, lines = (imread(tmp_path / name)[60:, :, :3] for name in ("faces.png", "lines.png"))  # below the titles
     assert 0.02 < np.mean(np.abs(faces - lines).max(axis=-1) > 0.1) < 0.2
 
@@ -155,7 +154,7 @@ def test_cut_shows_the_inside(tmp_path, drawing):
 def test_cut_leaves_out_the_part_that_looks_at_the_viewer():
     cube, size = benchmark_volume(1, amplitude=0.0), np.array([3.0, 2.0, 1.0])
     volume = replace(cube, control_points=cube.control_points * size)
-    patches = octant.patches_of(volume, [sampling.points_on(volume, grid) for grid in sampling.all_grids(9)])
+    patches = octant.patches_of(volume, [fields.points_on(volume, grid) for grid in fields.all_grids(9)])
     corner, view = octant.best_cut(patches[:6])
     outward = 2.0 * np.array(corner) - 1.0
     assert np.all(np.sign(view.towards) == outward)
@@ -180,7 +179,7 @@ def test_the_error_of_vectors_is_a_length():
     n, field = fields.SAMPLES, fields.error_of(volume, solution, problem)
     x, y, z = np.moveaxis(fields.points_of(volume).patches[4], -1, 0)
     exact = np.stack([x * y, np.sin(z), x], axis=-1)
-    found = solution.grid(*sampling.all_grids(n)[4]).reshape(n, n, 3)
+    found = solution.grid(*fields.all_grids(n)[4]).reshape(n, n, 3)
     assert field.patches[4] == pytest.approx(np.linalg.norm(exact - found, axis=-1), abs=1e-14)
 
 
@@ -189,7 +188,7 @@ def test_study_has_a_curve_a_degree(tmp_path):
     study = {degree: solve.convergence(benchmark_volume(2), problem, (0, 1), degree) for degree in (2, 3)}
     curves.draw_study(tmp_path / "study.png", study)
     image = imread(tmp_path / "study.png")[..., :3]
-    for color in sampling.FACE_COLORS[:2]:
+    for color in colors.FACE_COLORS[:2]:
         assert np.count_nonzero(np.abs(image - to_rgb(color)).max(axis=-1) < 0.02) > 100
 
 

@@ -4,8 +4,8 @@ import pytest
 from matplotlib.image import imread
 
 import iga_nn
-from iga_nn.figures.modes import draw_modes
 from iga_nn.figures.render import can_draw
+from iga_nn.figures.solution import draw_modes
 
 
 @pytest.mark.pictures

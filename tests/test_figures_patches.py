@@ -10,11 +10,11 @@ from matplotlib.image import imread
 
 import iga_nn
 import solve
-from iga_nn.figures import blocks, cutaway, fields, palette
+from iga_nn.figures import colors, cutaway, fields, style
 from iga_nn.figures import map as map_figures
 from iga_nn.figures import render as rendering
 from iga_nn.figures import solution as solution_figures
-from iga_nn.figures.evaluate import all_grids, outer_faces, points_on
+from iga_nn.figures.fields import all_grids, outer_faces, points_on
 from parameterize.certificate.boundary import Meeting
 from parameterize.spline.volume import FACE_NAMES
 
@@ -81,8 +81,8 @@ def test_the_half_beyond_a_plane_is_left_out():
 
 def test_each_patch_has_a_colour_and_many_share_them():
     few, many = ring(3), ring(45, shape=(3, 3, 2), degrees=(2, 2, 1))
-    assert [label for _, label in palette.color_labels(few)] == ["p0", "p1", "p2"]
-    labels = [label for _, label in palette.color_labels(many)]
+    assert [label for _, label in colors.color_labels(few)] == ["p0", "p1", "p2"]
+    labels = [label for _, label in colors.color_labels(many)]
     assert len(labels) == 20 and labels[0] == "p0, p20, p40" and labels[-1] == "p19, p39"
 
 
@@ -109,7 +109,7 @@ def test_figures_show_all_patches(tmp_path, drawing, small_views):
     for name, draw in map_figures.PLOTS.items():
         draw(tmp_path / f"{name}.png", body)
     pixels = rgb_to_hsv(imread(tmp_path / "faces.png")[..., :3].reshape(-1, 3))
-    for color in palette.PATCH_COLORS[:3]:
+    for color in colors.PATCH_COLORS[:3]:
         assert np.mean(np.abs(pixels[pixels[:, 1] > 0.2][:, 0] - rgb_to_hsv(to_rgb(color))[0]) < 0.02) > 0.05
     solution = iga_nn.solve(body, problem)
     solution_figures.draw_solution(tmp_path / "solution.png", body, solution)
@@ -120,17 +120,17 @@ def test_figures_show_all_patches(tmp_path, drawing, small_views):
         assert np.mean(np.ptp(image, axis=-1) > 0.1) > 0.05
 
 
-def shown_by(monkeypatch, module):
-    """The patches that a module would draw, panel after panel."""
+def shown(monkeypatch):
+    """The patches that would be drawn, panel after panel."""
     found = []
-    monkeypatch.setattr(module, "draw", lambda patches, *_: found.append(patches) or np.zeros((2, 2, 3)))
+    monkeypatch.setattr(style, "draw", lambda patches, *_: found.append(patches) or np.zeros((2, 2, 3)))
     return found
 
 
 def test_blocks_are_drawn_apart_and_their_interfaces_in_glass(monkeypatch, small_views):
     body = ring(3)
-    found = shown_by(monkeypatch, blocks)
-    figure = blocks.draw_blocks(None, body)
+    found = shown(monkeypatch)
+    figure = map_figures.draw_blocks(None, body)
     apart, glued = found
     assert (
         len(apart) == 18
@@ -146,7 +146,7 @@ def test_blocks_are_drawn_apart_and_their_interfaces_in_glass(monkeypatch, small
 
 def test_places_without_a_proof_and_meetings_are_shown_on_blocks(monkeypatch, small_views):
     body = ring(3)
-    around, drawn = [], shown_by(monkeypatch, map_figures)
+    around, drawn = [], shown(monkeypatch)
     monkeypatch.setattr(map_figures, "show_around", lambda panels, patches, marks: around.append((patches, marks)))
     map_figures.draw_folds(None, body, np.zeros((1, 3)))
     meeting = Meeting(((0.5, 1.0, 0.5), (0.5, 0.0, 0.5)), (2.0, 0.0, 0.0), (0, 2))

@@ -11,8 +11,8 @@ import iga_nn
 import solve
 from iga_nn.figures import fields
 from iga_nn.figures import render as rendering
-from iga_nn.figures.solution import draw_solution, moved_by
-from iga_nn.figures.warp import factor_for, in_words, warp_of
+from iga_nn.figures.fields import factor_for, warp_of
+from iga_nn.figures.solution import draw_solution, factor_in_words, moved_by
 from solve.study import benchmark_volume
 
 
@@ -23,7 +23,7 @@ def test_factors_are_round_and_show_the_largest_displacement_at_5_to_8_percent()
     for largest in np.geomspace(1e-9, 1e9, 500):
         assert 8.0 / 1.51 <= factor_for(100.0, largest) * largest <= 8.0 * (1 + 1e-9)
     assert factor_for(1.0, 0.0) == factor_for(1.0, np.inf) == 0.0
-    assert [in_words(factor) for factor in (0.1, 1.5, 300.0, 1.5e7)] == ["0.1", "1.5", "300", "1.5e+07"]
+    assert [factor_in_words(factor) for factor in (0.1, 1.5, 300.0, 1.5e7)] == ["0.1", "1.5", "300", "1.5e+07"]
 
 
 @pytest.fixture(scope="module")
@@ -37,7 +37,7 @@ def stretched():
 def test_a_body_is_deformed_and_a_temperature_is_not(stretched):
     bar, body = stretched
     points = fields.points_of(bar)
-    assert fields.diagonal_of(points) == pytest.approx(18**0.5)
+    assert points.diagonal == pytest.approx(18**0.5)
     assert warp_of(body, 18**0.5) == 8.0 and warp_of(body.field, 18**0.5) == 8.0
     end = moved_by(points, body, 8.0)[1]
     assert end[..., 0] == pytest.approx(4.0 + 8 * 0.04, abs=1e-6)

@@ -24,7 +24,7 @@ from shapes import ball
 
 import iga_nn
 from iga_nn.cli.commands import main
-from iga_nn.figures.evaluate import FACE_COLORS
+from iga_nn.figures.colors import FACE_COLORS
 from iga_nn.io.formats import load_volume
 from iga_nn.samples import write_obj
 from parameterize.surface.surface import surface_from_arrays

@@ -6,7 +6,7 @@ import os
 
 import numpy as np
 
-from iga_nn.figures.evaluate import FACE_COLORS
+from iga_nn.figures.colors import FACE_COLORS
 from iga_nn.live.queue import Job
 from iga_nn.live.state import colors, places, row, triangles
 from iga_nn.options import PoissonOptions

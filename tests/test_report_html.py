@@ -12,7 +12,7 @@ from matplotlib.colors import rgb_to_hsv, to_rgb
 
 import solve
 from iga_nn.cli.commands import main
-from iga_nn.figures.evaluate import FACE_COLORS
+from iga_nn.figures.colors import FACE_COLORS
 from iga_nn.report import html as page
 from iga_nn.report import viewer as scene
 from solve.study import benchmark_volume

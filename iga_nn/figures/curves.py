@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from ..level_table import Study
-from .evaluate import FACE_COLORS
+from .colors import FACE_COLORS
 from .style import blank, positive, save
 
 TERMS = {  # of the loss, as parameterize names them

@@ -15,9 +15,8 @@ from parameterize.spline.interface import face_layer
 from parameterize.spline.orientation import orientation
 from parameterize.spline.volume import AXES, FACE_NAMES
 
-from .evaluate import PER_PATCH
-from .fields import Samples
-from .palette import face_colors
+from .colors import face_colors
+from .fields import PER_PATCH, ColoredField, Samples
 from .render import Patch, View, plain_patch, view_of
 
 Octant = tuple[int, int, int]  # its corner of the cube: the sides, 0 or 1, of u, of v and of w
@@ -33,6 +32,14 @@ def patches_of(body: BodyLike, points: Sequence[Array], every: int = 0) -> list[
     faces = np.reshape(face_colors(body), (-1, len(FACE_NAMES))).tolist()
     named = [color for each in faces for color in (*each, INSIDE, INSIDE, INSIDE)]
     return [plain_patch(where, color, every=every) for where, color in zip(points, named, strict=True)]
+
+
+def colored(points: Sequence[Array], field: ColoredField, every: int = 0) -> list[Patch]:
+    """Return the patches at points (m, n, 3) in the colours of a field, without shading: they match its bar."""
+    return [
+        Patch(where, field.limits.colors(values), lit=False, every=every)
+        for where, values in zip(points, field.patches, strict=True)
+    ]
 
 
 def cut_of(body: BodyLike, faces: Sequence[Patch], points: Samples) -> tuple[Mask, View]:

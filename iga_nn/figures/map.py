@@ -1,7 +1,6 @@
-"""Draws a map: faces, parameter lines, cut, distortion, and where it is not proved or meets itself."""
+"""Draws a map: faces, blocks, parameter lines, cut, distortion, and where it is not proved or meets itself."""
 
-from collections.abc import Mapping
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -12,16 +11,17 @@ from parameterize.certificate.boundary import Meeting
 from parameterize.spline.body import Body, BodyLike, as_body
 from parameterize.spline.volume import FACE_NAMES
 
-from .cutaway import cut_of, octant_label, patches_of, visible
-from .evaluate import PER_PATCH, face_window, outer_faces, points_on
-from .fields import SAMPLES, distortion_of, points_of
-from .inside import show_inside
-from .render import NAMELESS, Patch, check_drawable, draw, plain_patch, view_of
-from .style import PANEL, color_bar, colors, name_colors, panels_of, save, show_around
+from .colors import face_colors
+from .cutaway import INSIDE, colored, cut_of, octant_label, patches_of, visible
+from .fields import PER_PATCH, SAMPLES, distortion_of, face_window, outer_faces, points_of, points_on
+from .render import NAMELESS, Patch, check_drawable, plain_patch, view_of
+from .style import color_bar, name_colors, panels_of, save, show, show_around, show_inside
 
 LINES = 10  # from one side of the cube to the other, with the last
 WINDOW = 0.15  # of the cube, on every side of a meeting place
 MEETING_COLORS = ("#4477aa", "#ee6677")
+APART = 0.35  # of a block's distance from the middle of all, by which it is moved away
+INTERFACE = "#ee6677"
 
 
 def draw_faces(path: str | Path | None, body: BodyLike, marks: Array | None = None) -> Figure:
@@ -77,13 +77,10 @@ def draw_cut(path: str | Path | None, body: BodyLike) -> Figure:
     """
     named, field = _patches_with(body, LINES), distortion_of(body)
     left_out, view = cut_of(body, [named[k] for k in outer_faces(body)], points_of(body))
-    distorted = [
-        replace(patch, colors=colors(values, field.limits), lit=False)
-        for patch, values in zip(named, field.patches, strict=True)
-    ]
+    distorted = colored(points_of(body).patches, field, named[0].every)
     figure, (panels,) = panels_of(1, 2)
     for panel, patches in zip(panels, (named, distorted), strict=True):
-        panel.imshow(draw(visible(body, patches, left_out), view, PANEL))
+        show(panel, "", visible(body, patches, left_out), view)
     name_colors(figure, body)
     color_bar(figure, panels, field.limits, field.title)
     if not as_body(body).is_single:
@@ -99,14 +96,38 @@ def draw_distortion(path: str | Path | None, body: BodyLike) -> Figure:
     """
     figure, (panels,) = panels_of(1, 3)
     field, points = distortion_of(body), points_of(body)
-    patches = [
-        Patch(where, colors(values, field.limits), lit=False)
-        for where, values in zip(points.patches, field.patches, strict=True)
-    ]
-    show_inside(panels, body, points, patches)
+    show_inside(panels, body, points, colored(points.patches, field))
     color_bar(figure, panels, field.limits, field.title)
     is_single = as_body(body).is_single
     return save(figure, path, "Distortion on the mid-sections" if is_single else "Distortion of the patches inside")
+
+
+def draw_blocks(path: str | Path | None, body: Body) -> Figure:
+    """Draw the blocks apart, each in its colour and with light glued faces, and the interfaces in the glass body."""
+    points, outer = points_of(body).patches, outer_faces(body)
+    every = [PER_PATCH * number + face for number in range(len(body)) for face in range(len(FACE_NAMES))]
+    glued = [k for k in every if k not in set(outer)]
+    palette, moves = face_colors(body), _moves(points, len(body))
+    apart = [
+        plain_patch(points[k] + moves[k // PER_PATCH], INSIDE if k in set(glued) else palette[number])
+        for number, k in enumerate(every)
+    ]
+    view = view_of([plain_patch(points[k], "0.6") for k in outer])
+    interfaces = [plain_patch(points[k], INTERFACE) for k in glued]
+    figure, (panels,) = panels_of(1, 2)
+    for panel, title, patches in zip(
+        panels, ("drawn apart", "interfaces"), (apart, [*interfaces, *glass(body)]), strict=True
+    ):
+        show(panel, title, patches, view)
+    name_colors(figure, body)
+    return save(figure, path, f"{len(body)} blocks, {len(body.interfaces)} interfaces; glued faces are light")
+
+
+def _moves(points: Sequence[Array], count: int) -> Array:
+    """Return by how much each block is moved, (count, 3). points: of nine faces and sections a block."""
+    own = [points[PER_PATCH * k : PER_PATCH * (k + 1)] for k in range(count)]
+    middles = np.array([np.mean([where.mean(axis=(0, 1)) for where in parts], axis=0) for parts in own])
+    return np.asarray(APART * (middles - middles.mean(axis=0)))
 
 
 def draw_folds(path: str | Path | None, body: BodyLike, places: Array) -> Figure:
@@ -127,8 +148,7 @@ def draw_meeting(path: str | Path | None, body: BodyLike, meeting: Meeting) -> F
     parts = [plain_patch(points, color, opacity=0.7) for points, color in zip(windows, MEETING_COLORS, strict=True)]
     figure, (panels,) = panels_of(1, 3)
     whole = glass(body)
-    panels[0].imshow(draw(whole, view_of(whole), PANEL, mark))
-    panels[0].set_title("whole boundary", fontsize=13)
+    show(panels[0], "whole boundary", whole, view_of(whole), mark)
     show_around(panels[1:], parts, mark)
     return save(figure, path, "The boundary meets itself at the black ball; the two parts near it")
 

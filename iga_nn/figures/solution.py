@@ -1,28 +1,43 @@
-"""Draws a solution and its error: on the boundary, inside where the volume is cut open, and on the mid-sections."""
+"""Draws a solution, its error and shapes of vibrations: on the boundary, in the body cut open, and inside."""
 
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from matplotlib.figure import Figure
 
 from parameterize.arrays import Array
-from parameterize.spline.body import BodyLike, as_body
-from solve import Solution
+from parameterize.spline.body import BodyLike, as_body, size_of
+from solve import Modes, Solution
 from solve.field import FieldOnBody
 from solve.forms.boundary_value_problem import BoundaryValueProblem
 
 from ..level_table import EXACT_ERRORS, TITLES
 from ..options import NO_UNITS, Units
-from .cutaway import cut_of, visible
-from .evaluate import outer_faces
-from .fields import STRESS, Field, Samples, diagonal_of, error_of, fields_of, points_of, solution_of, vectors_of
-from .inside import show_inside
-from .ranges import with_unit
-from .render import Patch, check_drawable, draw
-from .style import PANEL, color_bar, colors, panels_of, save, show_around
-from .warp import in_words, warp_of
+from .colors import ColorRange, with_unit
+from .cutaway import colored, cut_of, visible
+from .fields import (
+    ColoredField,
+    Samples,
+    all_grids,
+    error_of,
+    fields_of,
+    flat,
+    outer_faces,
+    points_of,
+    points_on,
+    solution_of,
+    vectors_of,
+    warp_of,
+)
+from .render import Patch, check_drawable, view_of
+from .style import color_bar, panels_of, save, show, show_around, show_inside
+
+MOST, COLUMNS = 6, 3  # modes
+MODE_SAMPLES = 61  # a direction of a face
+SWING = 0.15  # of the body's size: the largest displacement of a mode as drawn
 
 
 def draw_error(
@@ -38,7 +53,7 @@ def draw_error(
     """
     field, points = error_of(body, solution, problem), points_of(body)
     figure, rows = panels_of(2, 3)
-    patches = _colored(points.patches, field)
+    patches = colored(points.patches, field, every=len(points.patches[0]) - 1)
     show_around(rows[0][:2], [patches[k] for k in outer_faces(body)])
     _write_numbers(rows[0][2], solution)
     show_inside(rows[1], body, points, patches)
@@ -53,12 +68,12 @@ def draw_solution(path: str | Path | None, body: BodyLike, solution: FieldOnBody
     An elastic body is drawn as its displacements deform it, enlarged by a factor that the title states.
     """
     field, points = fields_of(solution)[0], points_of(body)
-    label = with_unit(field.title, units.stress if field.name == STRESS else units.displacement)
-    if not (factor := warp_of(solution, diagonal_of(points))):
+    label = field.titled(units)
+    if not (factor := warp_of(solution, points.diagonal)):
         return _draw_values(path, body, points.patches, field, label)
     largest = max(float(values.max()) for values in solution_of(solution).everywhere)
     most = with_unit(f"at most {largest:.3g}", units.displacement)
-    title = f"The deformed body: displacements, {most}, are drawn {in_words(factor)} times as large"
+    title = f"The deformed body: displacements, {most}, are drawn {factor_in_words(factor)} times as large"
     moved = moved_by(points, solution, factor)
     return _draw_values(path, body, moved, field, label, title)
 
@@ -86,34 +101,48 @@ def moved_by(points: Samples, solution: FieldOnBody, factor: float) -> list[Arra
 
 
 def _draw_values(
-    path: str | Path | None, body: BodyLike, points: Sequence[Array], field: Field, label: str, heading: str = ""
+    path: str | Path | None, body: BodyLike, points: Sequence[Array], field: ColoredField, label: str, heading: str = ""
 ) -> Figure:
     """Draw a field on the faces and sections of all patches at points (m, m, 3).
 
     label: of the colour bar. heading: of the figure.
     """
-    patches, at_rest = _colored(points, field), points_of(body)
+    patches, at_rest = colored(points, field, every=len(points[0]) - 1), points_of(body)  # lines along the borders
     figure, rows = panels_of(2, 3)
     faces = [patches[k] for k in outer_faces(body)]
     show_around(rows[0][:2], faces)
     left_out, view = cut_of(body, faces, at_rest)
     halved = [replace(patch, every=len(patch.points) // 2) for patch in patches]  # lines along the cut, too
-    rows[0][2].imshow(draw(visible(body, halved, left_out), view, PANEL))
-    rows[0][2].set_title("cut open", fontsize=13)
+    show(rows[0][2], "cut open", visible(body, halved, left_out), view)
     show_inside(rows[1], body, at_rest, patches)
     color_bar(figure, rows, field.limits, label)
     return save(figure, path, heading)
 
 
-def _colored(points: Sequence[Array], field: Field) -> list[Patch]:
-    """Return the patches at points (m, m, 3) in the colours of a field, without shading: they match its bar.
+def draw_modes(path: str | Path | None, body: BodyLike, modes: Modes) -> Figure:
+    """Draw the first modes, displacements, and their frequencies; the size of each is free, and the same in all."""
+    shown = list(zip(modes.frequencies, modes.shapes, strict=True))[:MOST]
+    figure, axes = panels_of(-(-len(shown) // COLUMNS), min(COLUMNS, len(shown)))
+    volumes, grids = as_body(body).patches, all_grids(MODE_SAMPLES)
+    size = size_of(volumes)
+    faces = [(k // len(grids), grids[k % len(grids)]) for k in outer_faces(body)]
+    still = [points_on(volumes[number], grid) for number, grid in faces]
+    for panel, (frequency, shape) in zip(axes.flat, shown, strict=False):
+        moved = [shape.patches[number].grid(*grid) for number, grid in faces]
+        far = [flat(np.linalg.norm(by, axis=-1)) for by in moved]
+        largest = max(float(values.max()) for values in far)
+        limits = ColorRange(0.0, largest)
+        patches = [
+            Patch(points + SWING * size / largest * flat(by), limits.colors(values), every=MODE_SAMPLES - 1)
+            for points, by, values in zip(still, moved, far, strict=True)
+        ]
+        show(panel, f"{frequency:.4g} Hz", patches, view_of(patches))
+    return save(figure, path, "The lowest modes, coloured by their displacement")
 
-    Lines along the borders show their shape.
-    """
-    return [
-        Patch(where, colors(values, field.limits), lit=False, every=len(where) - 1)
-        for where, values in zip(points, field.patches, strict=True)
-    ]
+
+def factor_in_words(factor: float) -> str:
+    """Return a factor as text, such as "300" or "2e+06"."""
+    return f"{factor:.6g}" if 1e-3 <= factor < 1e6 else f"{factor:.1e}"
 
 
 def plot_solution(solution: Solution, what: str, file: str | Path | None) -> Figure:

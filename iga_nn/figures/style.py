@@ -1,7 +1,7 @@
 """Holds the parts that figures share: the blank figure of matplotlib, rendered views on it, colours, the file."""
 
 import io
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -15,15 +15,16 @@ from numpy.typing import NDArray
 
 from parameterize.arrays import Array
 from parameterize.files import replacing
-from parameterize.spline.body import BodyLike
+from parameterize.spline.body import BodyLike, as_body
 
-from .evaluate import MAP
-from .palette import color_labels
-from .ranges import ColorRange
-from .render import NAMELESS, Patch, draw, view_of, widest_view
+from .colors import MAP, ColorRange, color_labels
+from .cutaway import beyond, visible
+from .fields import SECTIONS, Samples
+from .render import NAMELESS, Patch, View, draw, view_of, widest_view
 
 PANEL = (720, 560)  # pixels of one view
 NOTEBOOK_DPI = 72  # in a notebook a figure is as wide as the text
+UP, ASIDE = 0.4, 0.25  # of a viewer in front of a cut: shows more than one side of what is left
 
 
 class Picture(Figure):
@@ -51,21 +52,51 @@ def panels_of(rows: int, columns: int) -> tuple[Figure, Any]:
     return figure, axes
 
 
+def show(
+    panel: Any,
+    title: str,
+    patches: Sequence[Patch],
+    view: View,
+    marks: Array | None = None,
+    names: Mapping[str, Array] = NAMELESS,
+) -> None:
+    """Draw patches on a panel under a title. marks, names: as in `draw`."""
+    panel.imshow(draw(patches, view, PANEL, marks, names))
+    panel.set_title(title, fontsize=13)
+
+
 def show_around(
     panels: Any, patches: list[Patch], marks: Array | None = None, names: Mapping[str, Array] = NAMELESS
 ) -> None:
     """Draw the same patches from the front and from behind on two panels. marks, names: as in `draw`."""
     view = view_of(patches)
     for panel, title, direction in zip(panels, ("front", "back"), (view, view.turned()), strict=True):
-        panel.imshow(draw(patches, direction, PANEL, marks, names))
-        panel.set_title(title, fontsize=13)
+        show(panel, title, patches, direction, marks, names)
 
 
-def show_section(panel: Any, title: str, points: Array, colors: Array) -> None:
-    """Draw points (m, n, 3) on a section in colours (m, n, 3), without shading, as the reader sees most of it."""
-    patch = Patch(points, colors, lit=False)
-    panel.imshow(draw([patch], widest_view(points.reshape(-1, 3)), PANEL))
-    panel.set_title(title, fontsize=13)
+def show_inside(panels: Any, body: BodyLike, points: Samples, patches: Sequence[Patch]) -> None:
+    """Draw the nine patches of each patch of a body on three panels. points: of the body at rest.
+
+    Of a volume these are its mid-sections, without shading, as the reader sees most of each. Several patches are drawn
+    without the octants on the far side of x, of y and of z, as one sees them from there.
+    """
+    if as_body(body).is_single:
+        for panel, title, patch in zip(panels, SECTIONS, patches[6:], strict=True):
+            flat = Patch(patch.points, patch.colors, lit=False)
+            show(panel, title, [flat], widest_view(patch.points.reshape(-1, 3)))
+        return
+    for panel, name, towards in zip(panels, "xyz", np.eye(3), strict=True):
+        show(panel, f"cut across {name}", visible(body, patches, beyond(points, towards)), _alignment(towards))
+
+
+def _alignment(direction: Array) -> View:
+    """Return the view of a viewer who looks against an axis of space, a little from above and aside."""
+    up = np.array([0.0, 1.0, 0.0]) if direction[2] else np.array([0.0, 0.0, 1.0])
+    towards = direction + UP * up + ASIDE * np.cross(up, direction)
+    towards /= np.linalg.norm(towards)
+    right = np.cross(up, towards)
+    right /= np.linalg.norm(right)
+    return View(right, np.cross(towards, right), towards)
 
 
 def name_colors(figure: Figure, body: BodyLike) -> None:
@@ -80,11 +111,6 @@ def name_colors(figure: Figure, body: BodyLike) -> None:
         columnspacing=1.2,
         handlelength=1.4,
     )
-
-
-def colors(values: Array, limits: ColorRange) -> Array:
-    """Return red, green, blue (m, n, 3) of values (m, n)."""
-    return np.asarray(colormaps[MAP](limits.shares(values)))[..., :3]
 
 
 def color_bar(figure: Figure, panels: Any, limits: ColorRange, title: str) -> None:

@@ -30,7 +30,7 @@ from solve.quantities import on_grid
 from solve.solution import Solution
 
 from ..errors import InputError, one_line
-from ..figures.evaluate import Grid, arap_of, error_at, problems_on
+from ..figures.fields import Grid, arap_of, error_at, problems_on
 from .vtk import bezier_cells, breaks_of, save
 
 if TYPE_CHECKING:

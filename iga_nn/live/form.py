@@ -8,7 +8,7 @@ from typing import Any
 from parameterize.spline.volume import FACE_NAMES
 
 from ..errors import InputError
-from ..figures.evaluate import FACE_COLORS, face_labels
+from ..figures.colors import FACE_COLORS, face_labels
 from ..options import PROBLEMS, PoissonOptions, ProblemOptions
 
 _OPTION = re.compile(r"^ {8}(\w+): (.*(?:\n {12}.*)*)", re.MULTILINE)  # of the docstring of options

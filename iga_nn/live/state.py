@@ -14,7 +14,7 @@ from parameterize.cube.cube import nearest_faces
 from parameterize.progress import Progress
 from parameterize.surface.surface import Surface
 
-from ..figures.evaluate import FACE_COLORS
+from ..figures.colors import FACE_COLORS
 from ..options import ProblemOptions
 from ..report.artifacts import ARTIFACTS
 from ..rounding import clock

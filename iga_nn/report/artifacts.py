@@ -70,7 +70,7 @@ ARTIFACTS = (  # in the order of the pages
     Artifact("meeting.png", "map", "where the boundary meets itself", "map.draw_meeting", ("faulty", "meeting")),
     Artifact("folds.png", "map", "where det J > 0 is not proved", "map.draw_folds", ("faulty", "places")),
     Artifact("faces.png", "map", "images of the faces", "map.draw_faces", ("volume", "marks")),
-    Artifact("blocks.png", "map", "the blocks drawn apart, and their interfaces", "blocks.draw_blocks", ("blocks",)),
+    Artifact("blocks.png", "map", "the blocks drawn apart, and their interfaces", "map.draw_blocks", ("blocks",)),
     Artifact("lines.png", "map", "parameter lines on the faces", "map.draw_lines", ("volume",)),
     Artifact("cut.png", "map", "the volume cut open, with the distortion inside", "map.draw_cut", ("volume",)),
     Artifact("distortion.png", "map", "distortion on three sections", "map.draw_distortion", ("volume",)),
@@ -79,7 +79,7 @@ ARTIFACTS = (  # in the order of the pages
     Artifact("named_faces.png", "solution", "the volume's faces by name", "map.draw_faces", ("named_volume",)),
     Artifact("convergence.png", "solution", "errors over the mesh size", "curves.draw_study", ("levels",)),
     Artifact("error.png", "solution", "error on the boundary and on three sections", "solution.draw_error", _ERROR),
-    Artifact("modes.png", "modes", "the first modes, by frequency", "modes.draw_modes", ("volume", "modes")),
+    Artifact("modes.png", "modes", "the first modes, by frequency", "solution.draw_modes", ("volume", "modes")),
     Artifact(
         "study.png", "study", "errors of the convergence study over the mesh size", "curves.draw_study", ("study",)
     ),

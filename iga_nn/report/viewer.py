@@ -26,33 +26,32 @@ from solve.field import FieldOnBody
 from solve.forms.boundary_value_problem import BoundaryValueProblem
 from solve.forms.form import Quantity
 
-from ..figures import evaluate
+from ..figures.colors import MAP, color_labels, even_range, face_colors, face_labels
 from ..figures.cutaway import cut_of, patches_of, seen_quarters
-from ..figures.evaluate import PER_PATCH, outer_faces
 from ..figures.fields import (
     MANY,
-    STRESS,
-    Field,
+    PER_PATCH,
+    PLANES,
+    ColoredField,
     Samples,
-    diagonal_of,
     distortion_of,
     error_of,
+    factor_for,
     fields_of,
+    is_displacement,
     is_spatial,
+    outer_faces,
     points_of,
     quantity_of,
     vectors_of,
+    warp_of,
 )
-from ..figures.palette import color_labels, face_colors
-from ..figures.ranges import even_range, with_unit
-from ..figures.warp import factor_for, is_displacement, warp_of
 from ..options import NO_UNITS, Units
 
 Scene = dict[str, Any]
 
 LENGTH = 3  # in place of a component: the length of the vector
 COMPONENTS = {"|u|": LENGTH, "u_x": 0, "u_y": 1, "u_z": 2}  # fields that the page finds from the vectors
-PLANES = [(axis, side) for axis in range(3) for side in (0.0, 1.0)] + [(axis, 0.5) for axis in range(3)]
 EVEN = 0.01  # of a field's range: where half of the boundary varies less, the view opens on the inside
 
 
@@ -66,7 +65,7 @@ class Frame:
     """
 
     label: str
-    fields: Sequence[Field]
+    fields: Sequence[ColoredField]
     vectors: Samples | None = None
     displaces: bool = False
     knots: Sequence[Knots] | None = None
@@ -111,13 +110,8 @@ def scene_of(
     frame = Frame.of("", solution)
     if problem is not None and problem.exact is not None:
         frame = replace(frame, fields=[*frame.fields, error_of(body, solution, problem)])
-    frame = replace(frame, fields=[_with_unit(field, units) for field in frame.fields])
-    return _scene(body, [frame], coarser) | {"warp": warp_of(solution, diagonal_of(points_of(body)))}
-
-
-def _with_unit(field: Field, units: Units) -> Field:
-    """Return a field with its unit in the title."""
-    return replace(field, title=with_unit(field.title, units.stress if field.name == STRESS else units.displacement))
+    frame = replace(frame, fields=[replace(field, title=field.titled(units)) for field in frame.fields])
+    return _scene(body, [frame], coarser) | {"warp": warp_of(solution, points_of(body).diagonal)}
 
 
 def scene_of_frames(
@@ -157,7 +151,7 @@ def scene_of_frames(
     ]
     moved = [frame.vectors for frame in alike if frame.displaces and frame.vectors is not None]
     lengths = [np.linalg.norm(values, axis=-1).max() for vectors in moved for values in vectors.everywhere]
-    factor = factor_for(diagonal_of(points_of(body)), float(max(lengths, default=0.0)))
+    factor = factor_for(points_of(body).diagonal, float(max(lengths, default=0.0)))
     return _scene(body, alike, coarser) | {"warp": factor, "oscillates": oscillates}
 
 
@@ -190,8 +184,7 @@ def _scene(body: BodyLike, frames: Sequence[Frame], coarser: int) -> Scene:
     """Return a scene of frames with the same fields; the distortion of the body joins the first frame's fields."""
     points, patches = points_of(body), as_body(body).patches
     drawn = Drawn(outer_faces(body), coarser if len(patches) <= MANY else 1)  # many have few samples already
-    cloud = np.concatenate([where.reshape(-1, 3) for where in points.everywhere])
-    low, high = cloud.min(axis=0), cloud.max(axis=0)
+    low, high = points.cloud.min(axis=0), points.cloud.max(axis=0)
     images = patches_of(body, points.patches)
     left_out, view = cut_of(body, [images[k] for k in drawn.faces], points)
     count, many = (part.shape[1] for part in drawn.thinned(points))
@@ -209,7 +202,7 @@ def _scene(body: BodyLike, frames: Sequence[Frame], coarser: int) -> Scene:
         "axes": list(AXES) if as_body(body).is_single else [],  # along which there are sections through the cube
         "spans": [[breakpoints(row).tolist() for row in rows] for rows in knots],
         **_colors(body, drawn.faces),
-        "map": _packed(colormaps[evaluate.MAP](np.arange(256))[:, :3], np.uint8),  # (256, 3)
+        "map": _packed(colormaps[MAP](np.arange(256))[:, :3], np.uint8),  # (256, 3)
         "fields": [_described(field, frames[0]) for field in whole[0].fields],
         "frames": [_values(frame, bound, drawn) for frame in whole],
         "bound": bound,  # of the entries of all vectors
@@ -238,7 +231,7 @@ def _bits(quarters: Mask) -> int:
 
 def _colors(body: BodyLike, outer: Sequence[int]) -> dict[str, Any]:
     """Return the colours and the names of the outer faces, and the legend of the colours."""
-    colors, labels = np.reshape(face_colors(body), (-1, len(FACE_NAMES))), evaluate.face_labels()
+    colors, labels = np.reshape(face_colors(body), (-1, len(FACE_NAMES))), face_labels()
     glued = as_body(body)
     if not glued.is_single:
         labels = [glued.face_name(i, name) for i in range(len(glued)) for name in FACE_NAMES]
@@ -269,7 +262,7 @@ def _opening(frame: Frame, outer: Sequence[int]) -> dict[str, str]:
     return {"field": field.name, "part": "cut" if is_even and not frame.displaces else "surface"}
 
 
-def _described(field: Field, frame: Frame) -> dict[str, Any]:
+def _described(field: ColoredField, frame: Frame) -> dict[str, Any]:
     """Return the words of a field for the controls and the bar; the page computes its values from vectors if it can."""
     limits = field.limits
     described = {"name": field.name, "title": field.title, "low": limits.low, "high": limits.high}
@@ -277,7 +270,7 @@ def _described(field: Field, frame: Frame) -> dict[str, Any]:
     return described | ({"component": COMPONENTS[field.name]} if _is_derived(field, frame) else {})
 
 
-def _is_derived(field: Field, frame: Frame) -> bool:
+def _is_derived(field: ColoredField, frame: Frame) -> bool:
     return frame.vectors is not None and field.name in COMPONENTS
 
 

@@ -28,7 +28,7 @@ from solve.discretization.space import trial_space
 from solve.forms.boundary_value_problem import BoundaryValueProblem
 from solve.options import SolveOptions
 
-from ..figures.evaluate import problems_on
+from ..figures.fields import problems_on
 from ..rounding import rounded
 
 log = logging.getLogger(__name__)

@@ -15,7 +15,7 @@ from solve.forms.boundary_value_problem import BoundaryValueProblem
 from solve.reactions import Balance
 from solve.solution import Solution
 
-from ..figures.evaluate import problems_on
+from ..figures.fields import problems_on
 from ..options import UNITS, ProblemOptions
 from ..report import document as reports
 from .output_folder import digest

@@ -1,4 +1,4 @@
-"""The range of a field's colours, and the words at its colour bar, for figures and the interactive view alike.
+"""Chooses colours: of a volume's faces, of the patches of a body, and of a field's values, for figures and views alike.
 
 Nothing here loads the figures of matplotlib, which take longer than a view is made in.
 """
@@ -7,13 +7,48 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from matplotlib.colors import LogNorm, Normalize
+from matplotlib import colormaps
+from matplotlib.colors import LogNorm, Normalize, to_hex
 
 from parameterize.arrays import Array
+from parameterize.spline.body import BodyLike, as_body
+from parameterize.spline.volume import FACE_NAMES
+
+MAP = "viridis"  # colour map; perceptually uniform
+FACE_COLORS = ("#4477aa", "#66ccee", "#228833", "#ccbb44", "#ee6677", "#aa3377")  # also distinct for the colour-blind
+PATCH_COLORS = tuple(to_hex(color) for color in colormaps["tab20"].colors)  # type: ignore[attr-defined]
+NAMED = 4  # patches of one colour that its label names
 
 DECADES = 1e-4  # lower end of a logarithmic range over the largest error of the best mesh
 SMALLEST = 1e-200  # smaller fields have no ticks on their colour bar
 ROUNDING = 1e-14  # values whose relative difference is smaller count as one
+
+
+def face_labels() -> list[str]:
+    """Return the legend of the six colours, such as "u0: u = 0"."""
+    return [f"{name}: {name[0]} = {name[1]}" for name in FACE_NAMES]
+
+
+def face_colors(body: BodyLike) -> list[str]:
+    """Return the colours of six faces of each patch: those of the faces of a volume; of several each patch has one."""
+    glued = as_body(body)
+    if glued.is_single:
+        return list(FACE_COLORS)
+    return [PATCH_COLORS[i % len(PATCH_COLORS)] for i in range(len(glued)) for _ in FACE_NAMES]
+
+
+def color_labels(body: BodyLike) -> list[tuple[str, str]]:
+    """Return the legend of the colours: each with a label such as "u0: u = 0", of several patches such as "p3, p23"."""
+    glued = as_body(body)
+    if glued.is_single:
+        return list(zip(FACE_COLORS, face_labels(), strict=True))
+    names = [f"p{i}" for i in range(len(glued))]
+    alike = [names[i :: len(PATCH_COLORS)] for i in range(min(len(names), len(PATCH_COLORS)))]
+    return [(color, _shortened(each)) for color, each in zip(PATCH_COLORS, alike, strict=False)]
+
+
+def _shortened(names: Sequence[str]) -> str:
+    return ", ".join([*names[:NAMED], "…"] if len(names) > NAMED else names)
 
 
 @dataclass(frozen=True)
@@ -39,14 +74,9 @@ class ColorRange:
             return np.full(np.shape(values), 0.5)
         return np.asarray(self.norm()(np.ravel(values))).reshape(np.shape(values))
 
-    @property
-    def labels(self) -> tuple[str, str]:
-        """Return the texts at the two ends of a legend; a logarithmic one has all smaller values at its lower end."""
-        if self.remark:
-            return self.remark, ""
-        if self.logarithmic:
-            return f"≤ {self.low:.1e}", f"{self.high:.1e}"
-        return f"{self.low:.3g}", f"{self.high:.3g}"
+    def colors(self, values: Array) -> Array:
+        """Return red, green, blue (..., 3) of values (...)."""
+        return np.asarray(colormaps[MAP](self.shares(values)))[..., :3]
 
 
 def even_range(values: Sequence[Array]) -> ColorRange:
