@@ -1,6 +1,12 @@
 """Knows the public names of earlier versions: each goes on working, with a warning that says what it is called now."""
 
 import warnings
+from collections.abc import Callable
+from functools import wraps
+from typing import Any, ParamSpec, TypeVar
+
+Arguments = ParamSpec("Arguments")
+Result = TypeVar("Result")
 
 RENAMED = {  # a name of a package -> its name now
     "iga_nn.MultiPatch": "Body",
@@ -20,3 +26,17 @@ def renamed(package: str, name: str) -> str:
         raise AttributeError(f"module {package!r} has no attribute {name!r}")
     warnings.warn(f"{package}.{name} is now called {package}.{now}", DeprecationWarning, stacklevel=3)
     return now
+
+
+def takes_volume(function: Callable[Arguments, Result]) -> Callable[Arguments, Result]:
+    """Let a function whose first argument is `body` take it by its earlier keyword, `volume`, with a warning."""
+
+    @wraps(function)
+    def taking(*given: Any, **how: Any) -> Result:
+        if "volume" in how:
+            name = function.__name__
+            warnings.warn(f"{name}(volume=...) is now called {name}(body=...)", DeprecationWarning, stacklevel=2)
+            given = (how.pop("volume"), *given)
+        return function(*given, **how)
+
+    return taking

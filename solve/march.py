@@ -13,6 +13,7 @@ import numpy as np
 from parameterize.arrays import Array
 from parameterize.conjugate_gradients import LinearResult, conjugate_gradients
 from parameterize.display import Brief, above
+from parameterize.old_names import takes_volume
 from parameterize.spline.body import Body, BodyLike, as_body
 from parameterize.threads import one_blas_thread
 
@@ -74,6 +75,7 @@ class March(Brief):
         above("io.series").write_series(Path(path), self.times, self.fields, samples)
 
 
+@takes_volume
 def march(
     body: BodyLike,
     problem: BoundaryValueProblem | Callable[[float], BoundaryValueProblem],

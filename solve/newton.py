@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from parameterize.arrays import Array
 from parameterize.conjugate_gradients import INDEFINITE, conjugate_gradients
+from parameterize.old_names import takes_volume
 from parameterize.spline.body import Body, BodyLike, as_body
 from parameterize.threads import one_blas_thread
 
@@ -42,6 +43,7 @@ INNER = (1e-8, 1e-3)  # tolerances of the linear solves: the residual of Newton'
 log = logging.getLogger(__name__)
 
 
+@takes_volume
 def newton(
     body: BodyLike,
     problem: Problem,

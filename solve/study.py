@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from parameterize.display import Shown
+from parameterize.old_names import takes_volume
 from parameterize.spline.body import BodyLike
 from parameterize.spline.bspline import greville, open_uniform_knots
 from parameterize.spline.volume import BSplineVolume
@@ -60,8 +61,9 @@ class Convergence(list[ConvergenceRow], Shown):
         return "\n".join(map(str, self))
 
 
+@takes_volume
 def convergence(
-    volume: BodyLike,
+    body: BodyLike,
     problem: BoundaryValueProblem,
     refine: Iterable[int] = range(3),
     degree: int | None = None,
@@ -73,7 +75,7 @@ def convergence(
 
     Parameters
     ----------
-    volume, problem, degree, certified
+    body, problem, degree, certified
         As in `iga_nn.solve`; the errors are the same, too.
     refine : iterable of int
         Levels; level n halves every span n times.
@@ -97,7 +99,7 @@ def convergence(
     if not levels:
         raise ValueError(f"refine must be levels such as range(3), got {refine!r:.80}")
     options = SolveOptions(degree=degree, certified=certified, tolerance=tolerance)
-    return with_rates([solve_with(volume, problem, replace(options, refine=level)).report for level in levels])
+    return with_rates([solve_with(body, problem, replace(options, refine=level)).report for level in levels])
 
 
 def with_rates(reports: Sequence[SolveReport]) -> Convergence:

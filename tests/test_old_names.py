@@ -28,3 +28,12 @@ def test_a_body_of_an_earlier_pickle_is_found():
     body = iga_nn.Body((benchmark_volume(1),))
     earlier = pickle.dumps(body, protocol=0).replace(b"spline.body\nBody", b"spline.multipatch\nMultiPatch")
     assert b"multipatch" in earlier and type(pickle.loads(earlier)) is iga_nn.Body
+
+
+STEPS = {"start": "0", "dt": 1.0, "steps": 1}
+
+
+@pytest.mark.parametrize(("function", "more"), [(iga_nn.convergence, {}), (iga_nn.march, STEPS), (iga_nn.newton, {})])
+def test_a_body_by_its_earlier_keyword_is_taken_with_a_warning(function, more):
+    with pytest.warns(DeprecationWarning, match=rf"{function.__name__}\(volume=...\)"), pytest.raises(TypeError):
+        function(volume=None, problem=iga_nn.Poisson(source="1"), **more)
