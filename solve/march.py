@@ -72,7 +72,7 @@ class March(Brief):
 
         samples: linear cells a span and direction, which can be sliced; None for exact Bezier cells.
         """
-        above("io.series").write_series(Path(path), self.times, self.fields, samples)
+        above("io.view").write_series(Path(path), self.times, self.fields, samples)
 
 
 @takes_volume

@@ -19,7 +19,7 @@ from parameterize.spline.interface import Face
 from parameterize.spline.volume import AXES, FACE_NAMES, BSplineVolume
 
 from .patches import patch_of, projected
-from .words import Words, is_number
+from .words import Words, faults_of, is_number
 
 log = logging.getLogger(__name__)
 
@@ -75,10 +75,8 @@ def _read_patch(words: Words, name: str) -> BSplineVolume:
     total = int(np.prod(counts, dtype=object))
     points = np.stack([_reals(words, total, f"the {axis} coordinates of {name}") for axis in "xyz"], axis=1)
     weights = _reals(words, total, f"the weights of {name}")
-    try:
+    with faults_of(name):
         return patch_of(degrees, knots, projected(points, weights), weights)
-    except ValueError as error:
-        raise ValueError(f"{name}: {error}") from None
 
 
 def _read_interface(words: Words, name: str) -> tuple[Face, Face]:

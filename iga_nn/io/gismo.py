@@ -21,7 +21,7 @@ from parameterize.spline.volume import FACE_NAMES, BSplineVolume
 from solve.field import FieldOnBody, SplineField
 
 from .patches import as_text, fastest_first, patch_of
-from .words import finite_numbers
+from .words import faults_of, finite_numbers
 
 log = logging.getLogger(__name__)
 
@@ -56,9 +56,7 @@ def _parsed(text: str) -> Element:
     text = text[declaration.end() :] if declaration else text
     try:
         return ElementTree.fromstring(text)  # noqa: S314 - entities, the danger, are refused above
-    except ElementTree.ParseError as error:
-        raise ValueError(f"is not well-formed XML ({error})") from None
-    except ValueError as error:  # characters that XML does not have
+    except (ElementTree.ParseError, ValueError) as error:  # the latter for characters that XML does not have
         raise ValueError(f"is not well-formed XML ({error})") from None
 
 
@@ -130,10 +128,8 @@ def _read_patch(node: Element, name: str) -> BSplineVolume:
     weights = None if held is None else _numbers(held, f"{name}: the weights")
     if points.size % 3 or (weights is not None and 3 * weights.size != points.size):
         raise ValueError(f"{name}: control points are three numbers each, with a weight each or none")
-    try:
+    with faults_of(name):
         return patch_of(degrees, knots, points.reshape(-1, 3), weights)
-    except ValueError as error:
-        raise ValueError(f"{name}: {error}") from None
 
 
 def _declared(body: Element, ids: Sequence[int]) -> Iterator[tuple[Face, Face]]:

@@ -13,7 +13,7 @@ from parameterize.spline.volume import BSplineVolume
 
 from . import geopdes, gismo, mfem, mfem_writer, splinepy, view, vtk
 from .patches import body_of
-from .words import PACKED, text_of
+from .words import PACKED, faults_of, text_of
 
 HEAD = 4096  # bytes by which a kind is told
 
@@ -90,7 +90,5 @@ def read_body(path: Path, kind: str, tolerance: float) -> Body:
     """
     read = FORMATS[kind].read
     assert read is not None  # as `kind_of` finds it
-    try:
+    with faults_of(path):
         return body_of(*read(text_of(path)), tolerance)
-    except ValueError as error:
-        raise ValueError(f"{path}: {error}") from None

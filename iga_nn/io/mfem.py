@@ -12,7 +12,7 @@ from parameterize.spline.volume import BSplineVolume
 
 from .mfem_layout import Layout, turned_knots
 from .patches import patch_of, projected
-from .words import Words
+from .words import Words, faults_of
 
 HEADS = ("MFEM NURBS mesh v1.0", "MFEM NURBS mesh v1.1")
 CUBE, SQUARE = 5, 3  # MFEM's geometries
@@ -44,10 +44,8 @@ def read_mfem(text: str) -> tuple[list[BSplineVolume], list[tuple[Face, Face]]]:
     for number, (axes, places) in enumerate(zip(layout.axes, layout.numbers(counts), strict=True)):
         chosen = places.ravel(order="F")
         degrees, knots = [vectors[k][0] for k, _ in axes], [turned_knots(vectors[k][1], back) for k, back in axes]
-        try:
+        with faults_of(f"patch {number}"):
             patches.append(patch_of(degrees, knots, rows[chosen], weights[chosen]))
-        except ValueError as error:
-            raise ValueError(f"patch {number}: {error}") from None
     return patches, declared
 
 
@@ -107,12 +105,10 @@ def _read_patch(words: Words, name: str) -> BSplineVolume:
     counts = [len(row) - degree - 1 for degree, row in vectors]
     rows = words.reals(4 * int(np.prod(counts, dtype=object)), f"the control points of {name}").reshape(-1, 4)
     points, weights = rows[:, :3], rows[:, 3]
-    try:
+    with faults_of(name):
         if kind != "controlpoints_cartesian":
             points = projected(points, weights)
         return patch_of([degree for degree, _ in vectors], [row for _, row in vectors], points, weights)
-    except ValueError as error:
-        raise ValueError(f"{name}: {error}") from None
 
 
 def _read_weights(words: Words, size: int) -> Array:

@@ -2,6 +2,7 @@
 
 import logging
 from collections.abc import Iterable, Sequence
+from math import prod
 
 import numpy as np
 
@@ -16,12 +17,6 @@ WEIGHTS_ALIKE = 1e-12  # relative
 CLOSE = 0.01  # of the body's size: faces that are declared one and nearer than this were rounded or fitted apart
 
 
-def count_of(degrees: Sequence[int], knots: Sequence[Array]) -> int:
-    """Return how many control points belong to degrees and knot vectors; below 1 where these do not fit."""
-    counts = [len(row) - degree - 1 for row, degree in zip(knots, degrees, strict=True)]
-    return int(np.prod(counts, dtype=object)) if min(counts) > 0 else 0
-
-
 def patch_of(degrees: Sequence[int], knots: Sequence[Array], rows: Array, weights: Array | None) -> BSplineVolume:
     """Return the volume with these parts, its knots scaled to run from 0 to 1; the map stays.
 
@@ -31,7 +26,7 @@ def patch_of(degrees: Sequence[int], knots: Sequence[Array], rows: Array, weight
     if min(degrees) < 1:
         raise ValueError(f"has the degree {min(degrees)}; a degree is 1 or larger")
     counts = [len(row) - degree - 1 for row, degree in zip(knots, degrees, strict=True)]
-    if min(counts) < 1 or len(rows) != count_of(degrees, knots):
+    if min(counts) < 1 or len(rows) != prod(counts):
         raise ValueError(f"has {len(rows)} control points; degrees and knots ask for {' x '.join(map(str, counts))}")
     if not all(np.all(np.abs(row) < LARGEST) and row[-1] - row[0] > 1.0 / LARGEST for row in knots):  # refuses NaN, too
         raise ValueError(f"knots must be finite and span an interval of {1.0 / LARGEST:g} to {LARGEST:g}")

@@ -21,6 +21,7 @@ from solve.field import FieldOnBody, SplineField
 
 from ..errors import InputError, one_line
 from .patches import fastest_first, patch_of
+from .words import faults_of
 
 INSTALL = "pip install 'iga-nn[interop]'"
 
@@ -40,7 +41,11 @@ def read_json(text: str) -> tuple[list[BSplineVolume], list[tuple[Face, Face]]]:
             found = splinepy.io.json.load(str(file))
         except Exception as error:  # splinepy and its libraries raise a dozen kinds on damaged content
             raise ValueError(f"splinepy finds no spline in it ({one_line(error) or type(error).__name__})") from None
-    return [_named(number, spline) for number, spline in enumerate(found)], []
+    patches = []
+    for number, spline in enumerate(found):
+        with faults_of(f"spline {number}"):
+            patches.append(from_splinepy(spline))
+    return patches, []
 
 
 def _checked(text: str) -> str:
@@ -57,13 +62,6 @@ def _checked(text: str) -> str:
         return json.dumps(content)
     except (KeyError, TypeError, RecursionError, json.JSONDecodeError):
         raise ValueError("is not a list of splines as splinepy writes it") from None
-
-
-def _named(number: int, spline: Any) -> BSplineVolume:
-    try:
-        return from_splinepy(spline)
-    except ValueError as error:
-        raise ValueError(f"spline {number}: {error}") from None
 
 
 def write_json(path: Path, spline: BodyLike | FieldOnBody, *_: object) -> None:

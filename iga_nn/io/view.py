@@ -13,12 +13,14 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from parameterize.arrays import Array
+from parameterize.files import replacing, save_text
 from parameterize.spline.body import BodyLike, as_body
 from parameterize.spline.bspline import divided_spans
 from parameterize.spline.orientation import orientation
@@ -59,14 +61,7 @@ def write_view(
 
     samples: cells a span and direction, chosen by default. Raises InputError for quantities that are not known.
     """
-    parts = _parts(body, solution, problem)
-    grids = []
-    for part in parts:
-        shown = breaks_of(part.volume, part.solution)
-        most = MOST_VIEWED // len(parts)
-        rows = _fitting(shown, most)[0] if samples is None else [divided_spans(row, samples) for row in shown]
-        grids.append(_sampled(part.volume, rows, _of_map(part, rows) | _of(part, rows, quantities)))
-    save(path, _joined(body, grids))
+    save(path, _viewed(body, solution, problem, samples, quantities))
 
 
 def write_solution(path: Path, solution: Solution) -> int:
@@ -103,11 +98,41 @@ def grid(
         return bezier_cells(body, solution)
     if samples < 1:
         raise ValueError(f"samples {samples}: must be 1 or larger, or None for exact Bezier cells")
-    grids = []
-    for part in _parts(body, solution, problem):
-        rows = [divided_spans(row, samples) for row in breaks_of(part.volume, part.solution)]
+    return _viewed(body, solution, problem, samples, quantities)
+
+
+def _viewed(
+    body: BodyLike,
+    solution: FieldOnBody | None,
+    problem: BoundaryValueProblem | None,
+    samples: int | None,
+    quantities: Quantities | None,
+) -> pyvista.UnstructuredGrid:
+    """Return linear cells, `samples` a span and direction or as many as fit, with the values of map and solution."""
+    parts, grids = _parts(body, solution, problem), []
+    for part in parts:
+        shown = breaks_of(part.volume, part.solution)
+        most = MOST_VIEWED // len(parts)
+        rows = _fitting(shown, most)[0] if samples is None else [divided_spans(row, samples) for row in shown]
         grids.append(_sampled(part.volume, rows, _of_map(part, rows) | _of(part, rows, quantities)))
     return _joined(body, grids)
+
+
+def write_series(path: Path, times: Sequence[float], fields: Sequence[FieldOnBody], samples: int | None = None) -> None:
+    """Write a field at some times: a .pvd file that names the times, and a .vtu file for each beside it; atomic.
+
+    samples: as in `grid`. Raises ValueError for another ending, and for a field without a volume.
+    """
+    if path.suffix != ".pvd":
+        raise ValueError(f"{path}: a series of ParaView is a file that ends in .pvd")
+    entries = []
+    for number, (time, field) in enumerate(zip(times, fields, strict=True)):
+        target = path.with_name(f"{path.stem}_{number:04d}.vtu")
+        with replacing(target) as temporary:
+            save(temporary, grid(field.on_body, field, samples=samples))
+        entries.append(f'<DataSet timestep="{float(time)!r}" part="0" file="{escape(target.name)}"/>')
+    inside = "\n".join(entries)
+    save_text(path, f'<VTKFile type="Collection" version="0.1"><Collection>\n{inside}\n</Collection></VTKFile>\n')
 
 
 @dataclass(frozen=True)

@@ -20,6 +20,7 @@ tessellations are right. For slicing and clipping there are the samples of `io.v
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -60,39 +61,57 @@ def write_bezier(
     save(path, bezier_cells(body, solution))
 
 
+@dataclass(frozen=True)
+class _Exact:
+    """Hold the cells of a patch, rows of its points (s, nodes), their degrees, and the Bernstein coefficients.
+
+    points: (m_u, m_v, m_w, 3). weights: (m_u, m_v, m_w). values: of a solution, (m_u, m_v, m_w) or with components.
+    """
+
+    cells: IntArray
+    degrees: Sequence[int]
+    points: Array
+    weights: Array
+    values: Array | None
+
+
 def bezier_cells(body: BodyLike, solution: FieldOnBody | None) -> pyvista.UnstructuredGrid:
     """Return the cells of all patches; of several also the number of each cell's patch as the cell data `patch`.
 
     Neighbours share the points of their interface where these have the same weights, so that the surface of the grid is
     that of the body. Where the weights of two faces differ by a factor, each patch keeps points of its own.
     """
+    import pyvista
+
     body = as_body(body)
     fields = (None,) * len(body) if solution is None else solution.patches
-    grids = [exact_cells(patch, field) for patch, field in zip(body, fields, strict=True)]
-    if body.is_single:
-        return grids[0]
-    degrees = [grid.cell_data["HigherOrderDegrees"][0].astype(int).tolist() for grid in grids]
-    spans = [[len(row) - 1 for row in breaks_of(*pair)] for pair in zip(body, fields, strict=True)]
-    shapes = [tuple(1 + p * n for p, n in zip(*pair, strict=True)) for pair in zip(degrees, spans, strict=True)]
-    own = [grid.point_data["RationalWeights"].reshape(shape) for grid, shape in zip(grids, shapes, strict=True)]
-    labels, count = shared_numbers(shapes, [interface for interface in body.interfaces if _are_alike(own, interface)])
-    points, weights = np.empty((count, 3)), np.empty(count)
-    cells, sizes = [], []
-    for number, (grid, label) in enumerate(zip(grids, labels, strict=True)):
-        points[label.ravel()], weights[label] = grid.points, own[number]
-        rows = grid.cells.reshape(grid.n_cells, -1)
-        cells.append(np.column_stack([rows[:, :1], label.ravel()[rows[:, 1:]]]).ravel())
-        sizes.append(np.full(grid.n_cells, number))
-    raised = np.concatenate([grid.cell_data["HigherOrderDegrees"] for grid in grids])
-    joined = _grid(np.concatenate(cells), points, weights, raised)
-    joined.cell_data["patch"] = np.concatenate(sizes)
+    parts = [_exact(patch, field) for patch, field in zip(body, fields, strict=True)]
+    weights = [part.weights for part in parts]
+    glued = [interface for interface in body.interfaces if _are_alike(weights, interface)]
+    labels, count = shared_numbers([row.shape for row in weights], glued)
+    rows = [label.ravel()[part.cells] for label, part in zip(labels, parts, strict=True)]
+    counted = np.concatenate([np.insert(row, 0, row.shape[1], axis=1).ravel() for row in rows])
+    degrees = np.concatenate([np.tile(part.degrees, (len(part.cells), 1)) for part in parts]).astype(np.float64)
+    points = _entered([part.points for part in parts], labels, count)
+    grid = pyvista.UnstructuredGrid(counted, np.full(len(degrees), BEZIER_HEXAHEDRON), points)
+    grid.cell_data.set_array(degrees, "HigherOrderDegrees")
+    grid.point_data.set_array(_entered(weights, labels, count), "RationalWeights")
+    grid.GetCellData().SetActiveHigherOrderDegrees("HigherOrderDegrees")
+    grid.GetPointData().SetActiveRationalWeights("RationalWeights")
+    if not body.is_single:
+        grid.cell_data["patch"] = np.repeat(np.arange(len(parts)), list(map(len, rows)))
     if solution is not None:
-        found = [grid.point_data["u"].reshape(grid.n_points, -1) for grid in grids]
-        values = np.empty((count, found[0].shape[1]))
-        for own_values, label in zip(found, labels, strict=True):
-            values[label.ravel()] = own_values
-        joined.point_data["u"] = values[:, 0] if values.shape[1] == 1 else values
-    return joined
+        values = [part.values for part in parts if part.values is not None]
+        grid.point_data["u"] = _entered(values, labels, count)
+    return grid
+
+
+def _entered(values: Sequence[Array], labels: Sequence[IntArray], count: int) -> Array:
+    """Return values (m_u, m_v, m_w, ...) of each patch as one array (count, ...), by the numbers of their points."""
+    entered = np.empty((count, *values[0].shape[3:]))
+    for own, label in zip(values, labels, strict=True):
+        entered[label] = own
+    return entered
 
 
 def _are_alike(weights: Sequence[Array], interface: Interface) -> bool:
@@ -102,7 +121,7 @@ def _are_alike(weights: Sequence[Array], interface: Interface) -> bool:
     return first.shape == second.shape and np.allclose(first, second, rtol=WEIGHT_TOLERANCE, atol=0.0)
 
 
-def exact_cells(volume: BSplineVolume, solution: SplineField | None) -> pyvista.UnstructuredGrid:
+def _exact(volume: BSplineVolume, solution: SplineField | None) -> _Exact:
     """Return the cells of a volume with the coefficients of a solution on it."""
     shown: list[BSplineVolume | SplineField] = [volume] if solution is None else [volume, solution]
     breaks, degrees = breaks_of(volume, solution), [max(s.degrees[a] for s in shown) for a in range(3)]
@@ -111,17 +130,14 @@ def exact_cells(volume: BSplineVolume, solution: SplineField | None) -> pyvista.
     net = volume.control_points if volume.weights is None else volume.homogeneous
     net = _bernstein(volume.degrees, volume.knots, net, breaks, degrees)
     points, weights = (net, np.ones(net.shape[:3])) if volume.weights is None else projected(net)
-    cells = _cells([len(b) - 1 for b in breaks], degrees, orientation(volume) < 0)  # (s, nodes of a cell)
-    counted = np.column_stack([np.full(len(cells), cells.shape[1]), cells])
-    sizes = np.tile(degrees, (len(cells), 1)).astype(np.float64)
-    grid = _grid(counted.ravel(), points.reshape(-1, 3), weights.ravel(), sizes)
+    cells = _cells([len(b) - 1 for b in breaks], degrees, orientation(volume) < 0)
+    values = None
     if solution is not None and volume.weights is None:
         values = _bernstein(solution.degrees, solution.knots, solution.coefficients, breaks, degrees)
-        grid.point_data["u"] = values.reshape(-1, *values.shape[3:])
     elif solution is not None:
-        values = _weighted(solution, volume, breaks, degrees[0])
-        grid.point_data["u"] = values.reshape(weights.size, -1) / weights.reshape(-1, 1)
-    return grid
+        values = _weighted(solution, volume, breaks, degrees[0]) / weights[..., None]
+        values = values.reshape(*weights.shape, *solution.coefficients.shape[3:])
+    return _Exact(cells, degrees, points, weights, values)
 
 
 def _weighted(solution: SplineField, volume: BSplineVolume, breaks: Sequence[Array], degree: int) -> Array:
@@ -130,21 +146,6 @@ def _weighted(solution: SplineField, volume: BSplineVolume, breaks: Sequence[Arr
     u, v, w = (greville(row, degree) for row in knots)
     weight = evaluate_grid(volume.degrees, volume.knots, volume.homogeneous[..., 3:], (u, v, w))
     return interpolate_grid(knots, degree, solution.grid(u, v, w).reshape(*weight.shape[:3], -1) * weight)
-
-
-def _grid(cells: IntArray, points: Array, weights: Array, degrees: Array) -> pyvista.UnstructuredGrid:
-    """Return Bezier cells with the weights (m,) of points (m, 3) and degrees (s, 3).
-
-    cells: for each the number of its points, then the points.
-    """
-    import pyvista
-
-    grid = pyvista.UnstructuredGrid(cells, np.full(len(degrees), BEZIER_HEXAHEDRON), points)
-    grid.cell_data.set_array(degrees, "HigherOrderDegrees")
-    grid.point_data.set_array(weights, "RationalWeights")
-    grid.GetCellData().SetActiveHigherOrderDegrees("HigherOrderDegrees")
-    grid.GetPointData().SetActiveRationalWeights("RationalWeights")
-    return grid
 
 
 def breaks_of(volume: BSplineVolume, solution: SplineField | None) -> list[Array]:

@@ -1,6 +1,7 @@
 """Reads a text file of numbers word by word, and says at which line something is wrong."""
 
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -32,6 +33,15 @@ def text_of(path: Path) -> str:
         return content.decode("utf-8-sig")
     except UnicodeDecodeError:
         return content.decode("latin-1")
+
+
+@contextmanager
+def faults_of(what: object) -> Iterator[None]:
+    """Put the name of what is read before the message of a ValueError of the block."""
+    try:
+        yield
+    except ValueError as error:
+        raise ValueError(f"{what}: {error}") from None
 
 
 class Words:
