@@ -10,7 +10,8 @@ order of FACE_NAMES, three sections.
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import wraps
+from functools import partial, wraps
+from operator import itemgetter
 from typing import Any, Self, TypeVar
 
 import numpy as np
@@ -30,6 +31,7 @@ from ..options import Units
 from .colors import SMALLEST, ColorRange, error_range, even_range, with_unit
 
 Grid = tuple[Array, Array, Array]  # parameters of a tensor grid; on a face or a section one direction has one value
+OnGrid = Callable[[Array, Array, Array], Array]  # takes a tensor grid and gives (n_u, n_v, n_w, ...)
 Result = TypeVar("Result")
 
 SECTIONS = tuple(f"{axis} = 1/2" for axis in AXES)
@@ -148,43 +150,32 @@ def remembered(function: Callable[..., Result]) -> Callable[..., Result]:
     return found
 
 
-def sampled(values_on: Sequence[Callable[[Grid], Array]]) -> Samples:
-    """Return the samples of a function on each patch, which takes a tensor grid and gives (n_u, n_v, n_w, ...)."""
+def sampled(values_on: Sequence[OnGrid]) -> Samples:
+    """Return the samples of a function on each patch."""
     count = len(values_on)
     samples, lattice = (SAMPLES, LATTICE) if count == 1 else OF_SEVERAL if count <= MANY else OF_MANY
     even, grids = np.linspace(0.0, 1.0, lattice), all_grids(samples)
     return Samples(
-        [flat(values_at(grid)) for values_at in values_on for grid in grids],
-        [values_at((even, even, even)) for values_at in values_on],
+        [flat(values_at(*grid)) for values_at in values_on for grid in grids],
+        [values_at(even, even, even) for values_at in values_on],
     )
-
-
-def _on_grid(spline: Any) -> Callable[[Grid], Array]:
-    """Return the function that gives the values of a volume or a field on a grid."""
-    return lambda grid: spline.grid(*grid)
 
 
 @remembered
 def points_of(body: BodyLike) -> Samples:
     """Return the points (..., 3) of a body."""
-    return sampled([_on_grid(patch) for patch in as_body(body)])
+    return sampled([patch.grid for patch in as_body(body)])
 
 
-def arap_of(body: BodyLike) -> list[Callable[[Grid], Array]]:
-    """Return for each patch the function that gives the ARAP distortion (n_u, n_v, n_w) on a tensor grid.
+def arap_of(body: BodyLike) -> list[OnGrid]:
+    """Return for each patch the function that gives the ARAP distortion.
 
     A volume is measured at volume 1, each of several patches against its own box.
     """
     glued = as_body(body)
     if not glued.is_single:
-        return [_in_box(patch) for patch in glued]
-    scale = 1.0 / UnitFrame.of(glued).length
-    return [lambda grid: arap_on(glued.only, *grid, scale)]
-
-
-def _in_box(patch: BSplineVolume) -> Callable[[Grid], Array]:
-    box = own_box(patch)
-    return lambda grid: arap_in_box(patch, *grid, box)
+        return [partial(arap_in_box, patch, box=own_box(patch)) for patch in glued]
+    return [partial(arap_on, glued.only, scale=1.0 / UnitFrame.of(glued).length)]
 
 
 @remembered
@@ -198,7 +189,7 @@ def distortion_of(body: BodyLike) -> ColoredField:
 @remembered
 def vectors_of(solution: FieldOnBody) -> Samples:
     """Return the vectors (..., c) of a solution of several components, or its values (...)."""
-    return sampled([_on_grid(field) for field in solution.patches])
+    return sampled([field.grid for field in solution.patches])
 
 
 @remembered
@@ -216,11 +207,8 @@ def is_spatial(solution: FieldOnBody) -> bool:
 
 def components_of(solution: FieldOnBody) -> list[ColoredField]:
     """Return u_x, u_y and u_z of a vector of three components."""
-    return [_component(vectors_of(solution), k, f"u_{axis}") for k, axis in enumerate("xyz")]
-
-
-def _component(vectors: Samples, k: int, name: str) -> ColoredField:
-    return ColoredField.ranging(vectors.each(lambda values: values[..., k]), name, name)
+    parts = [vectors_of(solution).each(itemgetter((..., k))) for k in range(3)]
+    return [ColoredField.ranging(part, name, name) for part, name in zip(parts, ("u_x", "u_y", "u_z"), strict=True)]
 
 
 def quantity_of(
@@ -230,14 +218,9 @@ def quantity_of(
 
     quantity: of several patches also a function for each, where their materials differ.
     """
-    fields = solution.patches
-    laws = quantity if isinstance(quantity, Sequence) else [quantity] * len(fields)
-
-    def values_on(field: SplineField, law: Quantity) -> Callable[[Grid], Array]:
-        return lambda grid: grid_values(field, law, *grid)
-
+    laws = quantity if isinstance(quantity, Sequence) else [quantity] * len(solution.patches)
     try:
-        samples = sampled([values_on(field, law) for field, law in zip(fields, laws, strict=True)])
+        samples = sampled([partial(grid_values, *pair) for pair in zip(solution.patches, laws, strict=True)])
     except np.linalg.LinAlgError:  # det J = 0
         return None
     if not all(np.all(np.isfinite(values)) for values in samples.everywhere):
@@ -275,13 +258,15 @@ def error_at(values: Array, problem: BoundaryValueProblem, x: Points) -> Array:
 def error_of(body: BodyLike, solution: FieldOnBody, problem: BoundaryValueProblem) -> ColoredField:
     """Return |u - u_h|, whose range is logarithmic. problem: its exact solution is known."""
     parts = zip(as_body(body), solution.patches, problems_on(problem, body), strict=True)
-
-    def values_on(patch: Any, field: SplineField, own: BoundaryValueProblem) -> Callable[[Grid], Array]:
-        return lambda grid: error_at(field.grid(*grid), own, Points.on(patch, *grid))
-
-    samples = sampled([values_on(*part) for part in parts])
+    samples = sampled([partial(_error_on, *part) for part in parts])
     limits = error_range([samples.everywhere])
     return ColoredField(samples.patches, samples.lattices, "error", "|u − uₕ|", limits)
+
+
+def _error_on(
+    patch: BSplineVolume, field: SplineField, problem: BoundaryValueProblem, u: Array, v: Array, w: Array
+) -> Array:
+    return error_at(field.grid(u, v, w), problem, Points.on(patch, u, v, w))
 
 
 def quantities_of(solution: FieldOnBody) -> Mapping[str, Quantity] | None:

@@ -11,7 +11,7 @@ change places. The cells of several patches are in one grid, a block of cells af
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from html import escape
 from pathlib import Path
@@ -32,7 +32,7 @@ from solve.quantities import on_grid
 from solve.solution import Solution
 
 from ..errors import InputError, one_line
-from ..figures.fields import Grid, arap_of, error_at, problems_on
+from ..figures.fields import OnGrid, arap_of, error_at, problems_on
 from .vtk import bezier_cells, breaks_of, save
 
 if TYPE_CHECKING:
@@ -143,7 +143,7 @@ class _Part:
     """
 
     volume: BSplineVolume
-    arap: Callable[[Grid], Array]
+    arap: OnGrid
     solution: SplineField | None
     problem: BoundaryValueProblem | None
 
@@ -199,7 +199,7 @@ def _sampled(volume: BSplineVolume, rows: Rows, fields: Mapping[str, Array]) -> 
 
 def _of_map(part: _Part, rows: Rows) -> dict[str, Array]:
     u, v, w = rows
-    return {"arap": part.arap((u, v, w)), "det J": np.linalg.det(part.volume.grid_jacobian(u, v, w))}
+    return {"arap": part.arap(u, v, w), "det J": np.linalg.det(part.volume.grid_jacobian(u, v, w))}
 
 
 def _of(part: _Part, rows: Rows, quantities: Quantities | None) -> dict[str, Array]:
