@@ -31,9 +31,10 @@ $(DEV): $(RUN)
 demo: $(RUN)
 	$(BIN)/iga-nn run poisson seashell --out out/demo --force
 
-# The table of files in docs/output.md, and the site, in docs/_build/html; a warning is an error. Nothing is fetched.
+# The tables in docs/output.md and docs/ways.md, and the site, in docs/_build/html; a warning is an error. Nothing is fetched.
 docs: $(DEV)
 	$(BIN)/python -P docs/files_table.py
+	$(BIN)/python -P docs/ways_table.py
 	OMP_NUM_THREADS=1 $(BIN)/python -P -m sphinx -W --keep-going -b html docs docs/_build/html
 
 test: lint

@@ -16,6 +16,17 @@ MAX_CONTROL_POINTS = 100  # per direction
 StageName = Literal["S(2)", "S(1)", "cube", "corners", "edges"]
 PresetName = Literal["fast", "grown", "paper"]
 Device = Literal["auto", "cpu", "cuda"]  # where the network is trained; "auto" takes CUDA where it is available
+WayName = Literal[
+    "planes",
+    "stacks",
+    "body-with-stubs",
+    "blocks",
+    "sharp-edges",
+    "network",
+    "growth",
+    "stiff-growth",
+    "last-growth",
+]  # as the command line writes them; `ways/strategy.py` says which body takes which
 
 
 @dataclass(frozen=True)
@@ -97,12 +108,11 @@ class Config:
     refinement : RefinementConfig or None
         Where knots are inserted after the spline stage; None: the control points of `spline` are all there are.
     starts : int
-        The tries in all, at most 4: where a shape is hard to train, or the trained map is not certified, one is grown.
-        Where that is not certified or meets itself, a stiffer map is grown; in the end one that may be farther from
-        the surface.
+        The tries with one cube in all, at most 4: a shape that is hard to train is grown, see docs/ways.md.
     blocks : int or None
-        The most blocks of a map: 1 for one cube, a larger number for blocks along the skeleton, None for whichever
-        suits the body.
+        The most blocks of a map: 1 for one cube, None for as many as suit the body; see docs/ways.md.
+    ways : tuple of str
+        The names of the ways that may be taken, in their order; all if it is empty.
     steps_factor : float
         By which `scaled` has lengthened all stages: it also counts for steps that no other option sets.
 
@@ -121,6 +131,7 @@ class Config:
     starts: int = 4
     refinement: RefinementConfig | None = None
     blocks: int | None = None
+    ways: tuple[str, ...] = ()
     steps_factor: float = 1.0
 
     def scaled(self, factor: float) -> Config:

@@ -8,12 +8,14 @@ from typing import Any, ParamSpec, TypeVar
 Arguments = ParamSpec("Arguments")
 Result = TypeVar("Result")
 
-RENAMED = {  # a name of a package -> its name now
+RENAMED = {  # a name of a package or a class -> its name now
     "iga_nn.MultiPatch": "Body",
     "parameterize.BodyCertificate": "Certificate",
+    "parameterize.Parameterization.division": "decomposition",
     "solve.MultiPatchField": "BodyField",
     "solve.MultiPatchSolution": "Solution",
 }
+ORIGINS = {"extension": "sharp", "columns": "stacks"}  # of maps in report.json
 
 
 def renamed(package: str, name: str) -> str:

@@ -1,7 +1,7 @@
 """parameterize: a closed surface to a trivariate B-spline volume, certified where its proof succeeds."""
 
 import hashlib
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import asdict, dataclass, replace
 from numbers import Integral
 from pathlib import Path
@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .arrays import IntArray, in_brackets
-from .attempts import attempts
 from .certificate.body import Certificate, certify
 from .certificate.boundary import check_boundary
 from .checkpoint import Checkpoints
@@ -19,6 +18,7 @@ from .config import Config, preset
 from .cube.boundary_map import BoundaryMap, boundary_map
 from .cube.cube_layout import CubeLayout
 from .display import Brief
+from .old_names import renamed
 from .optimization.certified_map import CertifiedMap
 from .optimization.reassignment import reassign
 from .optimization.surface_distance import Correspondence
@@ -26,11 +26,13 @@ from .progress import History, ProgressCallback, ignore, timed
 from .quality.quality import QualityReport, measure
 from .refinement import Refinement, refine
 from .spline.body import Body, BodyLike
-from .starts.start import Origin, Task
-from .starts.tried import AttemptReport, best_of
 from .surface.surface import Surface
 from .training.backend import choose_device, choose_precision
 from .transfer import transferred
+from .ways.strategy import attempts, ways_of
+from .ways.task import MappingTask
+from .ways.tried import AttemptReport, best_of
+from .ways.way import Way
 
 MadeCallback = Callable[[BodyLike, dict[str, NDArray[Any]]], None]
 _LAST_SLIDES = 20  # of the boundary parameters before the boundary map is made, and again after `_LAST_SWEEPS`
@@ -60,15 +62,15 @@ class Parameterization(Brief):
         Where the network was trained.
     seed : int
     config : Config
-    origin : "network", "growth", "extension", "blocks", "planes" or "columns"
-        Where the map comes from: the trained network, a cube that grew, an extended layout of the surface, blocks along
-        the skeleton, exact blocks along the planes of the surface, or blocks along the outlines of extrusions.
+    origin : str
+        The kind of way that made the map: "network", "growth", "sharp", "blocks", "planes" or "stacks"; see
+        docs/ways.md.
     attempts : tuple of AttemptReport
-        The starts that were tried, in their order, with rounds and seconds by phase and the faults of their maps.
+        The ways that were tried, in their order, with rounds and seconds by phase and the faults of their maps.
     refinement : Refinement or None
         With config.refinement, how many control points each direction got, or all blocks together, and why no more.
-    division : str
-        Why the body was to become one cube or several blocks, in words, with the figures that decide; "" where the
+    decomposition : str
+        Why the body was to become one cube or several blocks, in words, with the figures that decide; "" if the
         options say it.
 
     Examples
@@ -89,10 +91,15 @@ class Parameterization(Brief):
     device: str
     seed: int
     config: Config
-    origin: Origin
+    origin: str
     attempts: tuple[AttemptReport, ...]
     refinement: Refinement | None = None
-    division: str = ""
+    decomposition: str = ""
+
+    @property
+    def division(self) -> str:
+        """Return the decomposition, by its earlier name."""
+        return str(getattr(self, renamed("parameterize.Parameterization", "division")))
 
 
 def parameterize(
@@ -103,6 +110,7 @@ def parameterize(
     device: str = "auto",
     dtype: str = "float32",
     corners: ArrayLike | None = None,
+    ways: Iterable[Way | str] = (),
     progress: ProgressCallback | None = None,
     when_made: MadeCallback | None = None,
     checkpoint_dir: str | Path | None = None,
@@ -127,6 +135,8 @@ def parameterize(
         The cube's corners on the surface: points in the surface's units, which take their nearest vertices, or vertex
         numbers; in the order (0,0,0), (0,0,1), (0,1,0), ..., (1,1,1). Chosen by the method where they are not given.
         They are those of one cube: refused for a body with handles, and where `config.blocks` asks for several.
+    ways : ways or their names, optional
+        Those that may be taken, in their order; those of `config` by default. docs/ways.md lists them.
     progress : callable, optional
         Called with a `Progress` at every step.
     when_made : callable, optional
@@ -147,11 +157,12 @@ def parameterize(
     TypeError
         For a surface, config, seed or progress of another type.
     ValueError
-        For a negative seed, bad corners, another precision or a device that is not there.
+        For a negative seed, bad corners, an unknown way, another precision or a device that is not there.
     CheckpointError
         For a checkpoint of another run.
     LayoutError
-        For a body with handles where `config.blocks` allows one, or fewer than its skeleton needs.
+        For a body with handles if `config.blocks` allows one, or fewer than its skeleton needs; or if none of the ways
+        suits it.
     SkeletonError
         For a body with handles whose tunnel is knotted, or that has too thin a part.
     PathError
@@ -168,6 +179,9 @@ def parameterize(
     config, seed = _checked(surface, config, seed)
     if progress is not None and not callable(progress):
         raise TypeError(f"progress must be a function of a Progress, or None, got {progress!r:.80}")
+    asked = tuple(ways)
+    taken = ways_of(asked or config.ways)
+    config = replace(config, ways=tuple(way.name for way in taken)) if asked else config
     place, dtype = choose_device(device), choose_precision(dtype)
     given = given_corners(surface, corners, config)
     config = config if given is None else config.holding_edges()
@@ -178,16 +192,16 @@ def parameterize(
     with timed(seconds, "fit"):
         copy, _ = surface.fitted
         held = given if given is None or copy is surface else corner_vertices(copy, surface.vertices[given])
-    task = Task(copy, config, seed, place, dtype, held, seconds, report, checkpoints)
-    tried = attempts(task, checkpoints)
+    task = MappingTask(copy, config, seed, place, dtype, held, seconds, report, checkpoints)
+    tried, decomposition = attempts(task, taken, checkpoints)
     best = best_of(tried)
-    assert best is not None  # the last start that is tried makes a map of any shape
-    start, attempt = best
-    found, fit, told = attempt.found, attempt.fit, None
+    assert best is not None, "at least one of the attempts has a map"
+    way, attempt = best
+    found, fit, refinement = attempt.found, attempt.fit, None
     if config.refinement is not None:
         with timed(seconds, "refine"):
             options = config.spline, config.refinement, attempt.weights
-            found, fit, told = refine(found, fit, *options, checkpoints=checkpoints, **report)
+            found, fit, refinement = refine(found, fit, *options, checkpoints=checkpoints, **report)
     with timed(seconds, "optimize"):
         body, boundary = _in_users_units(found, fit, task)
         if copy is not surface:
@@ -209,10 +223,10 @@ def parameterize(
         device=place,
         seed=seed,
         config=config,
-        origin=start.origin,
+        origin=way.origin,
         attempts=tuple(one.report() for one in tried),
-        refinement=told,
-        division=task.choice.reason,
+        refinement=refinement,
+        decomposition=decomposition,
     )
 
 
@@ -293,7 +307,7 @@ def corner_vertices(surface: Surface, corners: ArrayLike) -> IntArray:
     return np.asarray(numbers, dtype=np.int64)
 
 
-def _in_users_units(found: CertifiedMap, fit: Correspondence, task: Task) -> tuple[Body, BoundaryMap]:
+def _in_users_units(found: CertifiedMap, fit: Correspondence, task: MappingTask) -> tuple[Body, BoundaryMap]:
     """Return the map and its boundary map; parameters are first brought close to this map's closest points."""
     surface, spline = task.surface, found.spline
     if not spline.nets.is_single:

@@ -33,7 +33,7 @@ def formula_parameterization(amplitude: float = 0.08, **given: Any) -> Any:
     from parameterize.cube.boundary_map import BoundaryMap
     from parameterize.quality.quality import measure
     from parameterize.run import Parameterization
-    from parameterize.starts.tried import AttemptReport
+    from parameterize.ways.tried import AttemptReport
     from solve.study import benchmark_volume
 
     cube = sample("cube")

@@ -16,7 +16,7 @@ from parameterize.optimization.term import Weights
 from parameterize.spline.bspline import greville, open_uniform_knots
 from parameterize.spline.control_nets import ControlNets
 from parameterize.spline.spline_map import SplineMap
-from parameterize.starts.growth import Grow
+from parameterize.ways.growth import Grow
 
 KNOTS = (open_uniform_knots(14, 3),) * 3
 NETS = ControlNets(3, (KNOTS,))

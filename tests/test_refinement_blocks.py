@@ -101,7 +101,7 @@ def test_a_torus_is_refined_to_a_tolerance(monkeypatch):
     config = preset("fast").scaled(0.3).refined(1e-4, 40)
     result = parameterize(surface_from_arrays(points, faces), config)
     told = result.refinement
-    assert result.origin == "blocks" and result.division.startswith("1 handle, ")
+    assert result.origin == "blocks" and result.decomposition.startswith("1 handle, ")
     assert result.certificate.verdict == "certified"
     assert len(told.levels) > 1 and told.levels[-1].distance < told.levels[0].distance
     assert told.stopped != "tolerance met" or told.levels[-1].distance <= 1e-4

@@ -114,7 +114,14 @@ def test_verdicts_of_what_went_wrong(result):
 
 @pytest.mark.parametrize(
     ("origin", "words"),
-    [("network", "the network"), ("growth", "a growing cube"), ("blocks", "blocks along the skeleton")],
+    [
+        ("network", "the network"),
+        ("growth", "a growing cube"),
+        ("blocks", "blocks along the skeleton"),
+        ("extension", "the surface&#39;s layout on a cube"),  # the names of earlier versions
+        ("columns", "blocks"),
+        ("magic", "magic"),
+    ],
 )
 def test_page_says_where_the_map_comes_from(result, origin, words):
     report = json.loads((result / "report.json").read_text())

@@ -21,10 +21,10 @@ from parameterize.cube.cutting import subdivide_finely
 from parameterize.optimization.phases import FIRM_ROUNDS
 from parameterize.run import corner_vertices, parameterize
 from parameterize.spline.sampled_boundary import SampledBoundary
-from parameterize.starts.start import MOST_POINTS
 from parameterize.surface.surface import surface_from_arrays
 from parameterize.training.backend import choose_device, choose_precision
 from parameterize.training.trainer import start_map
+from parameterize.ways.task import MOST_POINTS
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -77,7 +77,7 @@ def test_cut_vertices_are_fitted_to_the_volume_and_leave_it_as_it_is(surface, un
 
 def test_where_the_edges_cannot_be_traced_training_and_layout_say_so(surface, monkeypatch, caplog):
     monkeypatch.setattr(edge_paths, "_ORDERS", 0)
-    monkeypatch.setattr("parameterize.starts.network._FEW_FLIPS", -1.0)
+    monkeypatch.setattr("parameterize.ways.network._FEW_FLIPS", -1.0)
     config = tiny_config()
     parameterize(surface, replace(config, spline=replace(config.spline, rounds=1)), seed=3, device="cpu")
     assert "training ends before stage edges: no path left" in caplog.text
@@ -219,7 +219,7 @@ def hard_config(starts=2, easy_loss=1e-9):
 def few_shares():
     """Two rounds in which F grows."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("parameterize.starts.growth.SHARES", (0.1, 1.0))
+        patch.setattr("parameterize.ways.growth.SHARES", (0.1, 1.0))
         yield
 
 
@@ -391,7 +391,7 @@ def test_the_start_map_makes_a_cloud_round():
 
 
 def test_the_result_tells_why_the_body_is_one_cube(undisturbed):
-    assert undisturbed.division.startswith("no handles, and a compact body: ")
+    assert undisturbed.decomposition.startswith("no handles, and a compact body: ")
 
 
 def test_corners_are_refused_for_a_body_with_handles_and_for_several_blocks(surface):

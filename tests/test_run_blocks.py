@@ -9,7 +9,7 @@ import trimesh
 from block_starts import torus
 from conftest import told
 
-import parameterize.starts.blocks as starts
+import parameterize.ways.blocks as ways
 from iga_nn.cli.commands import main
 from iga_nn.samples import write_obj
 from parameterize.config import preset
@@ -43,7 +43,7 @@ def test_a_ring_becomes_certified_blocks_in_its_own_units(ring, undisturbed):
     found = undisturbed.volume.points(boundary.patches, boundary.parameters)
     assert np.linalg.norm(found - ring.vertices, axis=1).max() < 0.01 * np.ptp(ring.vertices, axis=0).max()
     (attempt,) = undisturbed.attempts
-    assert attempt.start == "blocks" and attempt.rounds["approach"] == len(starts._FACE_SHARES)
+    assert attempt.start == "blocks" and attempt.rounds["approach"] == len(ways._FACE_SHARES)
 
 
 @pytest.mark.slow

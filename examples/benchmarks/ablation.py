@@ -32,7 +32,7 @@ from iga_nn.level_table import csv_text
 from iga_nn.options import MapOptions, WorkerOptions
 from iga_nn.report import document as reports
 from iga_nn.workflow.worker_run import Ended
-from parameterize import attempts, config
+from parameterize import config
 from parameterize.files import save_text
 from parameterize.layouts.rods import along_skeleton as layout
 from parameterize.optimization import anchors, phases, rounds
@@ -41,9 +41,7 @@ from parameterize.optimization.anchors import Anchors
 from parameterize.optimization.endings import Reason
 from parameterize.optimization.energy import SplineEnergy
 from parameterize.optimization.sliding import SlidingParameters
-from parameterize.starts import blocks as starts_blocks
-from parameterize.starts import body as starts_body
-from parameterize.starts import growth, network, on_cube, sharp, start
+from parameterize.ways import blocks, growth, network, one_cube, sharp, strategy, stubs
 
 NAME = "ablation.py"
 WHOLE = "nothing"  # is left out
@@ -79,13 +77,13 @@ class Part:
     used: Callable[[Tried], bool] = any_use
 
 
-def without_start(name: str) -> Part:
-    """Leave a start out."""
+def without_way(name: str) -> Part:
+    """Leave a way out."""
 
     def leave_out() -> None:
-        attempts.STARTS = tuple(one for one in attempts.STARTS if one.name != name)
+        strategy.WAYS = tuple(one for one in strategy.WAYS if one.name != name)
 
-    return Part(f"the start: {name}", leave_out, starts_with(name))
+    return Part(f"the way: {name}", leave_out, starts_with(name))
 
 
 def put(owner: Any, **values: Any) -> Callable[[], None]:
@@ -149,7 +147,7 @@ def raised_floors() -> None:
     raised = {name: replace(getattr(growth, name), least_floor=1.0) for name in ("STIFF", "LAST")}
     others = {one.name: one for one in raised.values()}
     put(growth, **raised)()
-    put(attempts, **raised, STARTS=tuple(others.get(one.name, one) for one in attempts.STARTS))()
+    put(strategy, **raised, WAYS=tuple(others.get(one.name, one) for one in strategy.WAYS))()
 
 
 STIFFER = ("stiff growth", "last growth")
@@ -160,10 +158,10 @@ UNFOLDING, PARTING, POLISHING = has_phase("unfold", 1), has_phase("separate"), h
 PARTS: dict[str, Part] = {
     "network": Part("the trained network: every map is grown", train(easy_loss=0.0), trained),
     "giving up": Part("giving up the training: every map is trained to the end", train(easy_loss=None), GROWN),
-    "growth": without_start("growth"),
-    "stiff growth": without_start("stiff growth"),
-    "last growth": without_start("last growth"),
-    "sharp edges": Part("the start along sharp edges", put(start.Task, ridges=None), starts_with("sharp edges")),
+    "growth": without_way("growth"),
+    "stiff growth": without_way("stiff growth"),
+    "last growth": without_way("last growth"),
+    "sharp edges": Part("the way along sharp edges", put(sharp, ridges_of=lambda _: None), starts_with("sharp edges")),
     "blocks": Part("blocks along limbs", fast(lambda options: replace(options, blocks=1)), IN_BLOCKS),
     "rows": Part("rows of limbs side by side", put(layout, with_rows=lambda skeleton, _: (skeleton, {})), IN_BLOCKS),
     "anchored faces": Part(
@@ -173,7 +171,7 @@ PARTS: dict[str, Part] = {
     ),
     "soft rounds": Part(
         "the last rounds of blocks, with the usual weights",
-        together(*(put(made, softened=lambda stiff, *_: stiff) for made in (starts_blocks, starts_body))),
+        together(*(put(made, softened=lambda stiff, *_: stiff) for made in (blocks, stubs))),
         starts_with("blocks", "body with stubs"),
     ),
     "merging": Part("merging of near junctions", put(layout, merge=lambda skeleton, _: skeleton), IN_BLOCKS),
@@ -183,7 +181,7 @@ PARTS: dict[str, Part] = {
     "S(1)": Part("the stage S(1)", no_stage("S(1)"), trained),
     "half the steps": Part("half of the steps after the first stage", share_of_steps(0.5), trained),
     "third of the steps": Part("two thirds of the steps after the first stage", share_of_steps(1.0 / 3.0), trained),
-    "turning": Part("the turn of the cube before growth", put(on_cube, best_turn=lambda *_: np.eye(3)), ON_SPHERE),
+    "turning": Part("the turn of the cube before growth", put(one_cube, best_turn=lambda *_: np.eye(3)), ON_SPHERE),
     "coarse rounds": Part(
         "first rounds on fewer control points",
         together(put(network, COARSE=1.0), put(sharp, COARSE=1.0), put(growth, _COARSE=1.0)),

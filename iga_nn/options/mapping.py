@@ -3,12 +3,14 @@
 Annotations are evaluated in this module: a subclass in another module would look up their names in that module.
 """
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any, Literal
 
 from parameterize.config import Config, Device, PresetName, RefinementConfig, SplineConfig
 from parameterize.config import preset as config_of
+
+from parameterize.config import WayName
 
 from ..errors import InputError, input_errors
 from ..type_check import Checked
@@ -55,9 +57,9 @@ class MapOptions(SurfaceOptions):
         control_points: number of control points per direction; "auto" starts with 30 and adds more where the distance
             is large, for each direction apart, until it meets the tolerance or max_control_points is reached. Several
             blocks have a fifth as many spans across each, at least 4.
-        blocks: 1 for one cube, a larger number for at most so many blocks, or "auto": exact blocks for a body that
-            planes bound, columns for a stack of extrusions, blocks along the skeleton for one with handles or
-            limbs, one cube for the others.
+        blocks: 1 for one cube, a larger number for at most so many blocks, or "auto" for as many as suit the body, see
+            docs/ways.md.
+        ways: the ways to a map that may be taken, in their order, such as planes stacks; all by default.
         corners: JSON file with a list of eight corners, in the order (0,0,0), (0,0,1), (0,1,0), ..., (1,1,1) of the
             cube's: points of three coordinates in the surface's units, or vertex numbers counted from 0; or an object
             {"XYZ": [...]} with eight points in X, Y, Z, scaled to volume 1 about the middle of the bounding box.
@@ -79,6 +81,7 @@ class MapOptions(SurfaceOptions):
     device: Device = "auto"
     control_points: int | Literal["auto"] = SplineConfig.control_points
     blocks: int | Literal["auto"] = "auto"
+    ways: tuple[WayName, ...] = ()
     corners: Path | None = None
     resume: bool = False
     steps_factor: float = Config.steps_factor
@@ -94,6 +97,7 @@ class MapOptions(SurfaceOptions):
             if self.corners is not None:
                 config = config.holding_edges()
             config = config.with_blocks(None if self.blocks == "auto" else self.blocks)
+            config = replace(config, ways=tuple(way.replace("-", " ") for way in self.ways))
             if self.control_points == "auto":
                 return config.refined(self.tolerance, self.max_control_points)
             for name in ("tolerance", "max_control_points"):

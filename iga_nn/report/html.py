@@ -13,6 +13,7 @@ from typing import Any
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from parameterize.files import save_text
+from parameterize.old_names import ORIGINS
 
 from ..errors import one_line
 from ..level_table import TITLES, as_rows, capitalized
@@ -36,14 +37,6 @@ MEANINGS = {
     "certified": "{claim} is proved on {whole}, rounding errors included.",
     "folded": "The map folds: det J has the wrong sign somewhere. Do not trust a solution on it.",
     "undecided": "Neither {claim} on {whole} nor a fold could be proved.",
-}
-ORIGINS = {
-    "network": ("the network", "trained on the surface"),
-    "growth": ("a growing cube", "the surface laid on its faces without the network"),
-    "extension": ("the surface's layout on a cube", "extended into the solid without the network"),
-    "blocks": ("blocks along the skeleton", "glued by whole faces, and drawn to the surface"),
-    "planes": ("exact blocks", "along the planes of the surface"),
-    "columns": ("blocks", "along the outlines of extrusions"),
 }
 
 
@@ -164,10 +157,18 @@ def _facts(report: Report) -> list[tuple[str, str, str]]:
         facts += [(f"Mode {i}", f"{f:.4g}", "frequency") for i, f in enumerate(vibration["frequencies"], start=1)]
     facts += _sizes(quality)
     if "origin" in quality:
-        facts.append(("The map comes from", *ORIGINS[quality["origin"]]))
+        facts.append(("The map comes from", *_source(quality["origin"])))
     if refinement := quality.get("refinement"):
         facts.append(("Control points chosen", refinement["stopped"], reports.control_points_in_words(report)))
     return facts
+
+
+def _source(origin: str) -> tuple[str, str]:
+    """Return the source of a map, and how it is made, in words, for its origin in report.json."""
+    from parameterize.ways.strategy import WAYS
+
+    words = {way.origin: way.comes_from for way in WAYS}
+    return words.get(ORIGINS.get(origin, origin), (origin, ""))
 
 
 def _sizes(quality: Report) -> list[tuple[str, str, str]]:

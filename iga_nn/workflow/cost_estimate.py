@@ -1,9 +1,7 @@
 """Estimates the time and the memory of a run, and the memory of a solve, before it starts.
 
-The cost of a run follows from counts and the time of two small pieces of work on all threads: a pass (the network
-forward and backward on 1000 points) and a product with the second derivative of the spline's distortion. The number of
-these pieces in a run was measured on conch and duck, and for hard surfaces on bone and homer. For bodies that take
-another way than these, none is known, and no time is told. The cost of a solve follows from counts alone.
+The way that a map will take counts its work in two pieces, see parameterize/ways/cost.py: passes and products. Their
+time is measured on all threads. The cost of a solve follows from counts alone.
 """
 
 from __future__ import annotations
@@ -12,12 +10,13 @@ import logging
 import math
 import platform
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
+from parameterize.checkpoint import Checkpoints
 from parameterize.config import Config, SplineConfig
 from parameterize.spline.body import BodyLike, as_body
 from parameterize.spline.volume import BSplineVolume
@@ -39,16 +38,10 @@ PASS_POINTS = 4096  # that a pass is timed with, on all threads
 LARGEST = 30  # control points per direction that the product is timed with; beyond, it grows with their number
 
 # Passes
-TRAINING_STEP = 1.3e-3  # for each of its points
-NEWTON_VERTEX, LAST_VERTEX = 6e-4, 0.04  # for each vertex of the surface: a Newton step, and all that comes after them
+LAST_VERTEX = 0.04  # for each vertex of the surface: all that comes after the map
 CALLS = 0.12  # least cost of a product
 UNKNOWN = 2.4e-3  # for each unknown of the problem solved
 REST = 1000.0  # libraries loaded, figures drawn
-
-# Products
-NEWTON_STEP, CERTIFICATE, FIT = 55.0, 270.0, 500.0
-EASY, HARD = (5, 13), (15, 20)  # rounds, and Newton steps a round, on all control points
-HARD_AFTER = (3, 14)  # rounds, and Newton steps a round, after each insertion of knots
 
 # Megabytes
 LIBRARIES, FIGURES, PER_CONTROL_POINT, PER_VERTEX, PER_UNKNOWN = 560.0, 400.0, 8e-3, 16e-3, 1.6e-3
@@ -64,19 +57,18 @@ EVERYWHERE = 3  # an unknown: the solution, whole on every process
 class Forecast:
     """Hold the cost of one start, the section `estimate` of report.json.
 
-    seconds: the seconds for an easy and for a hard surface, None for a body that takes another way. memory_mb: the peak
-    of the resident memory. other_way: that way in words.
+    seconds: the seconds for an easy and for a hard surface, None if the work of the way is not known. memory_mb: the
+    peak of the resident memory. way: the name of the way, "" if none suits.
     """
 
     seconds: tuple[float, float] | None
     memory_mb: float
-    other_way: str = ""
+    way: str = ""
 
     def __str__(self) -> str:
         if self.seconds is None:
-            return (
-                f"no forecast of the time for {self.other_way} yet, {rounded(self.memory_mb / 1000.0, 1)} GB of memory"
-            )
+            way = f"the way: {self.way}" if self.way else "this body"
+            return f"no forecast of the time for {way}, {rounded(self.memory_mb / 1000.0, 1)} GB of memory"
         low, high = self.seconds
         unit, size = ("minute", 60.0) if high >= 90.0 else ("second", 1.0)
         first, last = max(1, round(low / size)), max(1, round(high / size))
@@ -90,93 +82,36 @@ def forecast(
     *,
     device: str,
     unknowns: int = 0,
-    corners: bool = False,
+    corners: Sequence[int] | None = None,
+    checkpoints: Checkpoints | None = None,
     clock: Clock = time.perf_counter,
 ) -> Forecast:
-    """Return the estimate for this machine under its present load.
+    """Return the estimate for this machine under its present load, by the first way that the map will take.
 
-    unknowns: the number of unknowns of the largest problem that is solved afterwards. corners: whether the user gives
-    corners: those are of one cube that is trained, also where planes bound the body. A second start, where the first
-    map is not certified, takes the same time again. Exact blocks are neither trained nor optimised.
+    unknowns: the number of unknowns of the largest problem that is solved afterwards. corners: the vertices (8,) that
+    the user gives. checkpoints: of a run that resumes, whose way is known. A second way, if the first map is not
+    certified, takes the same time again.
     """
-    from parameterize.layouts.planes.exact_blocks import division_of
     from parameterize.training.backend import one_thread_an_operation
-    from parameterize.training.effort import points_of_a_step
+    from parameterize.ways.strategy import cost_of_first, ways_of
+    from parameterize.ways.task import MappingTask
 
-    spline, vertices = config.spline, len(surface.vertices)
-    points = points_of_a_step(surface.unit_vertices, surface.faces, config.train)
-    is_exact = not corners and division_of(surface, config.blocks) is not None
-    most = spline.control_points if config.refinement is None or is_exact else config.refinement.max_control_points
-    activations = 8 * points * config.network.width * (2 * config.network.modules + 3) / 1e6
-    mapped = PER_CONTROL_POINT * most**3 + PER_VERTEX * vertices
-    memory = LIBRARIES + FIGURES + max(activations, mapped, PER_UNKNOWN * unknowns)
-    if not is_exact and (way := _other_way(surface, config, corners)):
+    vertices, given = len(surface.vertices), None if corners is None else np.array(corners)
+    kept = checkpoints or Checkpoints.none()
+    task = MappingTask(surface, config, 0, device, "float32", given, {}, {}, kept)
+    way, cost = cost_of_first(task, ways_of(config.ways))
+    points = config.spline.control_points**3 if cost is None else cost.control_points
+    mapped = PER_CONTROL_POINT * points + PER_VERTEX * vertices
+    memory = LIBRARIES + FIGURES + max(cost.memory_mb if cost else 0.0, mapped, PER_UNKNOWN * unknowns)
+    if cost is None:
         return Forecast(None, memory, way)
     with one_thread_an_operation():  # as the run does: a helping thread keeps its first settings
         one_pass = _pass_seconds(config, device, clock)
-        product = _product_seconds(spline, clock) + CALLS * one_pass
+        product = _product_seconds(config.spline, clock) + CALLS * one_pass
     last = (REST + LAST_VERTEX * vertices + UNKNOWN * unknowns) * one_pass
-    step = NEWTON_STEP * product + NEWTON_VERTEX * vertices * one_pass
-    fits = [
-        FIT * product + min(rounds, spline.rounds) * (min(steps, spline.steps) * step + CERTIFICATE * product)
-        for rounds, steps in (EASY, HARD)
-    ]
-    if is_exact:
-        fits = [CERTIFICATE * product] * 2
-    steps_of_training = (0, 0) if is_exact else _training_steps(config, corners)
-    trainings = [count * TRAINING_STEP * points * one_pass for count in steps_of_training]
-    low, high = sorted(training + fit + last for training, fit in zip(trainings, fits, strict=True))
-    if config.refinement is not None and not is_exact:  # it may end with the first spline, or only at its limit
-        rounds, steps = HARD_AFTER
-        growths = _growths(config.refinement.max_control_points, spline.control_points)
-        high += sum(growths) * rounds * (min(steps, spline.steps) * step + CERTIFICATE * product)
-    return Forecast((low, high), memory)
-
-
-def _other_way(surface: Surface, config: Config, corners: bool) -> str:
-    """Return in words which way a body takes, or may take, instead of a cube that is trained; "" where it takes none.
-
-    Only what takes a second is looked at: which limbs a long body has, for one, takes longer.
-    """
-    from parameterize.layouts.stacks.stack import stack_of
-    from parameterize.layouts.stacks.tapers import tapered_stack_of
-    from parameterize.starts.start import COMPACT, Task
-
-    if surface.genus or (config.blocks or 1) > 1:
-        return "blocks"
-    task = Task(surface, config, 0, "cpu", "float32", None, {}, {})
-    points, faces = surface.to_unit(surface.vertices), surface.faces
-    if (
-        not corners
-        and config.blocks != 1
-        and (stack_of(points, faces) or tapered_stack_of(points, faces, surface.sharp))
-    ):
-        return "blocks of extrusions"
-    if config.starts > 1 and task.ridges is not None:
-        return "layouts along sharp edges"
-    is_long = config.blocks is None and not corners and task.compactness >= COMPACT
-    return "bodies with limbs, which may become blocks" if is_long else ""
-
-
-def _training_steps(config: Config, corners: bool) -> tuple[float, float]:
-    """Return the training steps for an easy surface, and for a hard one: those of the first stage, or none.
-
-    The first stage shows whether a surface is hard. corners: whether they are given: then there is one start.
-    """
-    steps, limit = sum(stage.steps for stage in config.stages), config.train.easy_loss
-    steps += math.ceil(config.train.race * next((stage.steps for stage in config.stages if stage.name == "cube"), 0))
-    if limit is None or config.starts == 1 or corners:
-        return steps, steps
-    return (0, 0) if limit == 0.0 else (steps, config.stages[0].steps)
-
-
-def _growths(most: int, control_points: int) -> list[float]:
-    """Return the factors by which the number of control points grows in each refinement, up to `most` a direction."""
-    from parameterize.refinement import GROWTH
-
-    whole = (most / control_points) ** 3
-    count = math.ceil(math.log(whole) / math.log(GROWTH))
-    return [min(GROWTH**number, whole) for number in range(1, count + 1)]
+    pairs = zip(cost.passes, cost.products, strict=True)
+    low, high = sorted(passes * one_pass + products * product + last for passes, products in pairs)
+    return Forecast((low, high), memory, way)
 
 
 def _pass_seconds(config: Config, device: str, clock: Clock) -> float:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from parameterize.arrays import Array, IntArray
-from parameterize.checkpoint import differing
+from parameterize.checkpoint import CheckpointError, Checkpoints, differing
 from parameterize.compilation import compilation_told
 from parameterize.files import array_names, load_arrays, save_arrays
 from parameterize.progress import ProgressCallback
@@ -170,9 +170,9 @@ def _prepare(
         log.warning("%s: %s", surface.name, notice)
     if problem is not None:
         _check_data(problem, surface)
-    is_resumed = mapping.resume and has_checkpoint(state.folder)
-    if is_resumed:
-        _check_checkpoint(state.folder / CHECKPOINT, given)
+    checkpoints = None
+    if is_resumed := mapping.resume and has_checkpoint(state.folder):
+        checkpoints = _checkpoints(state.folder / CHECKPOINT, given)
     else:
         state.begin("map", "solution")
     if mapping.resume and not is_resumed:
@@ -183,7 +183,8 @@ def _prepare(
             mapping.config(),
             device=given.identity["device"],
             unknowns=unknowns,
-            corners=given.marks is not None,
+            corners=given.identity["corners"],
+            checkpoints=checkpoints,
         )
     log.info("estimate: %s", expected)
     needed = f"{rounded(expected.memory_mb / 1000.0, 1)} GB of memory are needed"
@@ -196,14 +197,14 @@ def _notices(surface: Surface) -> list[str]:
     return [*surface.notices, *filter(None, [surface.fitted[1]])]
 
 
-def _check_checkpoint(folder: Path, given: MapInput) -> None:
-    """Raise InputError for a checkpoint of another run, before any computation."""
-    from parameterize.checkpoint import CheckpointError, Checkpoints
-
+def _checkpoints(folder: Path, given: MapInput) -> Checkpoints:
+    """Return the checkpoints of a run that resumes. Raises InputError for those of another run."""
+    checkpoints = Checkpoints(folder, given.identity, resume=True)
     try:
-        Checkpoints(folder, given.identity, resume=True).check()
+        checkpoints.check()
     except CheckpointError as error:
         raise InputError(str(error)) from None
+    return checkpoints
 
 
 def read_corners(path: Path, frame: UnitFrame | None = None) -> Array | IntArray:
@@ -285,7 +286,6 @@ def _train(
 
     made: `when_made` of `parameterize`.
     """
-    from parameterize.checkpoint import CheckpointError
     from parameterize.cube.edge_paths import PathError
     from parameterize.layouts.rods.along_skeleton import LayoutError
     from parameterize.layouts.skeleton.graph import SkeletonError
@@ -327,7 +327,7 @@ def _write(
         device=result.device,
         versions=reports.versions(),
         parameterization=with_unproved(result.quality.as_dict(), as_body(result.volume), result.certificate)
-        | {"origin": result.origin, "division": result.division}
+        | {"origin": result.origin, "decomposition": result.decomposition, "division": result.decomposition}
         | {"attempts": [asdict(attempt) for attempt in result.attempts]}
         | ({"refinement": asdict(result.refinement)} if result.refinement else {}),
     )

@@ -10,7 +10,7 @@ from parameterize.quality.quality import measure
 from parameterize.run import Parameterization
 from parameterize.spline.orientation import orientation
 from parameterize.spline.sampled_boundary import SampledBoundary
-from parameterize.starts.tried import AttemptReport
+from parameterize.ways.tried import AttemptReport
 
 DIGITS = 9  # of coordinates by which samples of two faces are one vertex
 

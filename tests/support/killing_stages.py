@@ -21,11 +21,14 @@ from killing import finished, said_of, started
 from mesh_files import obj
 from plane_bodies import arrays, prism
 from small_run import FEW, small_surface, tiny_config
-from test_cube_carried import drum
+from test_cube_constrained import drum
 
 import parameterize.cube.sphere as sphere
-import parameterize.starts.start as start
 import parameterize.training.trainer as trainer
+import parameterize.ways.blocks as blocks
+import parameterize.ways.planes as planes
+import parameterize.ways.stacks as stacks
+import parameterize.ways.task as task
 from iga_nn.options import MapOptions
 from iga_nn.workflow.output_folder import RunFolder
 from parameterize.checkpoint import Checkpoints
@@ -67,10 +70,10 @@ STAGES = (
     Stage("pillow", FOUR, "spline-1-coarse", 3, (*SPHERE, (sphere, "_stepped"))),
     Stage("pillow", FOUR, "spline-1", 1, (*SPHERE, (sphere, "_stepped"))),
     Stage("drum", FOUR.with_blocks(1), "sphere", 2, SPHERE),
-    Stage("L", TINY, "first", 1, ((start, "layout_of"),)),
-    Stage("shaft", TINY, "first", 1, ((start, "columns_of"),)),
-    Stage("ring", TINY, "first", 1, ((start, "block_layout"), (start, "skeleton_of"))),
-    Stage("ring", TINY, "spline", 2, ((start, "block_layout"), (start, "skeleton_of"))),
+    Stage("L", TINY, "first", 1, ((planes, "layout_of"),)),
+    Stage("shaft", TINY, "first", 1, ((stacks, "columns_of"),)),
+    Stage("ring", TINY, "first", 1, ((blocks, "block_layout"), (task, "skeleton_of"))),
+    Stage("ring", TINY, "spline", 2, ((blocks, "block_layout"), (task, "skeleton_of"))),
 )
 save = Checkpoints.save
 

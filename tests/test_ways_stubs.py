@@ -1,4 +1,4 @@
-"""The start from a body with stubs: what its report counts, and when other starts follow."""
+"""The way to a body with stubs: what its report counts, and when other ways follow."""
 
 from collections import Counter
 from dataclasses import replace
@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from thick_bodies import eared
 
-import parameterize.starts.body as starts
+import parameterize.ways.stubs as ways
 from parameterize.checkpoint import Checkpoints
 from parameterize.config import preset
 from parameterize.optimization.certified_map import CertifiedMap
@@ -16,9 +16,10 @@ from parameterize.optimization.term import Weights
 from parameterize.progress import History, ignore
 from parameterize.spline.spline_map import SplineMap
 from parameterize.spline.volume import BSplineVolume
-from parameterize.starts.start import Attempt, Task
 from parameterize.surface.errors import MeshError
 from parameterize.surface.surface import surface_from_arrays
+from parameterize.ways.task import MappingTask
+from parameterize.ways.way import Attempt
 
 NOTHING_KEPT = Checkpoints(None, {}, resume=False)
 
@@ -41,23 +42,25 @@ class Cube:
 def task():
     vertices, faces, _ = eared()
     report = {"history": History(), "progress": ignore}
-    return Task(surface_from_arrays(vertices, faces, "eared"), preset("fast"), 0, "cpu", "float64", None, {}, report)
+    return MappingTask(
+        surface_from_arrays(vertices, faces, "eared"), preset("fast"), 0, "cpu", "float64", None, {}, report
+    )
 
 
 @pytest.fixture
 def as_begun(monkeypatch):
     """All blocks stay as they are laid, after one round."""
-    monkeypatch.setattr(starts, "GROWTH", Cube())
-    monkeypatch.setattr(starts, "softened", lambda stiff, *_: stiff)
+    monkeypatch.setattr(ways, "GROWTH", Cube())
+    monkeypatch.setattr(ways, "softened", lambda stiff, *_: stiff)
 
     def begun(first, *_):
         return attempt(first, {"approach": 1, "unfold": 2}, {"approach": 1.0, "unfold": 0.25})
 
-    monkeypatch.setattr(starts, "optimized", begun)
+    monkeypatch.setattr(ways, "optimized", begun)
 
 
 def test_rounds_and_seconds_of_the_body_alone_count(task, as_begun):
-    made = starts.BODY.make(task, NOTHING_KEPT)
+    made = ways.STUBS.make(task, NOTHING_KEPT)
     assert made.course.rounds == {"grow": 11, "approach": 1, "unfold": 3}
     assert made.course.seconds == {"grow": 3.0, "approach": 1.0, "unfold": 0.75}
     assert made.found.certificate.verdict == "certified" and len(made.found.spline.nets.knots) > 10
@@ -65,14 +68,14 @@ def test_rounds_and_seconds_of_the_body_alone_count(task, as_begun):
     assert np.linalg.norm(corner - 0.5) < 1.0
 
 
-def test_other_starts_follow_a_body_that_is_refused_or_has_too_many_blocks(task, as_begun, monkeypatch, caplog):
+def test_other_ways_follow_a_body_that_is_refused_or_has_too_many_blocks(task, as_begun, monkeypatch, caplog):
     few = replace(task, config=replace(task.config, blocks=3))
-    assert starts.BODY.make(few, NOTHING_KEPT) is None
+    assert ways.STUBS.make(few, NOTHING_KEPT) is None
     assert "at most 3 are allowed" in caplog.text
 
     def refused(*_):
         raise MeshError("sheets touch in a point")
 
-    monkeypatch.setattr(starts, "surface_from_arrays", refused)
-    assert starts.BODY.make(task, NOTHING_KEPT) is None
+    monkeypatch.setattr(ways, "surface_from_arrays", refused)
+    assert ways.STUBS.make(task, NOTHING_KEPT) is None
     assert "sheets touch in a point" in caplog.text

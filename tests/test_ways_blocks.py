@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import dataclasses
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from thick_bodies import plate, star
 
-from parameterize.layouts.skeleton.choice import choose
 from parameterize.layouts.skeleton.graph import Branch, Skeleton
 from parameterize.layouts.skeleton.solid import skeleton_of
+from parameterize.ways import stubs
+from parameterize.ways.blocks import BLOCKS, of_limbs
 
 AXES = np.concatenate([np.eye(3), -np.eye(3)])
 
@@ -24,9 +26,9 @@ def limbs(count, length, tube):
 
 
 def test_long_limbs_get_blocks_and_the_reason_names_them():
-    choice = choose(limbs(4, 10.0, 0.9), stubs=False)
-    assert choice.division == "blocks" and choice.reason.startswith("4 limbs: 0.90 of the volume")
-    assert "longest limb 10.0 radii" in choice.reason
+    suits = of_limbs(limbs(4, 10.0, 0.9))
+    assert suits.applies and suits.why.startswith("4 limbs: 0.90 of the volume")
+    assert "longest limb 10.0 radii" in suits.why
 
 
 @pytest.mark.parametrize(
@@ -43,21 +45,28 @@ def test_other_bodies_without_handles_stay_one_cube(skeleton, reason):
         first, second = skeleton.branches
         rod = Branch((0, 1), np.concatenate([first.points[::-1], second.points[1:]]), np.ones(17))
         skeleton = dataclasses.replace(skeleton, nodes=skeleton.nodes[1:], radii=np.ones(2), branches=(rod,))
-    choice = choose(skeleton, stubs=False)
-    assert choice.division == "cube" and reason in choice.reason
+    suits = of_limbs(skeleton)
+    assert not suits.applies and reason in suits.why
+
+
+def with_handles(skeleton):
+    """A task of a body whose skeleton has handles."""
+    return SimpleNamespace(surface=SimpleNamespace(genus=skeleton.handles), skeleton=skeleton)
 
 
 def test_a_body_with_limbs_and_a_plate_with_one_hole_get_blocks():
-    assert choose(skeleton_of(*star(AXES[:4], reach=2.2)), stubs=False).division == "blocks"
-    choice = choose(skeleton_of(*plate([(0, 0)])), stubs=False)
-    assert choice.division == "blocks" and "1 handle, flat branches" in choice.reason
+    assert of_limbs(skeleton_of(*star(AXES[:4], reach=2.2))).applies
+    suits = BLOCKS.suits(with_handles(skeleton_of(*plate([(0, 0)]))))
+    assert suits.applies and "1 handle, flat branches" in suits.why
 
 
-def test_thin_handles_on_a_fat_body_get_stubs_and_thick_branches_blocks():
+def test_thin_handles_on_a_fat_body_get_stubs_and_thick_branches_blocks(monkeypatch):
     """A ring of which little is in balls around its curve, and one that these fill."""
     turns = np.linspace(0.0, 2.0 * np.pi, 33)
     curve = np.stack([np.cos(turns), np.sin(turns), 0.0 * turns], axis=1)
-    for tube, division in ((0.2, "body"), (0.8, "blocks")):
-        skeleton = Skeleton(curve[:1], np.ones(1), (Branch((0, 0), curve, np.ones(33)),), tube, 0.04)
-        assert choose(skeleton, stubs=True).division == division
-        assert choose(skeleton, stubs=False).division == "blocks"
+    for tube, thin in ((0.2, True), (0.8, False)):
+        task = with_handles(Skeleton(curve[:1], np.ones(1), (Branch((0, 0), curve, np.ones(33)),), tube, 0.04))
+        monkeypatch.setattr(stubs, "_handles", lambda _: ("a handle",))
+        assert stubs.STUBS.suits(task).applies == thin and BLOCKS.suits(task).applies
+        monkeypatch.setattr(stubs, "_handles", lambda _: ())
+        assert not stubs.STUBS.suits(task).applies

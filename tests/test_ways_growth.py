@@ -15,10 +15,10 @@ from parameterize.optimization.certified_map import CertifiedMap
 from parameterize.optimization.term import Weights
 from parameterize.progress import History, Progress, ignore
 from parameterize.spline.bspline import open_uniform_knots
-from parameterize.starts.growth import GROWTH, LAST, SHARES, STIFF, first_cube
-from parameterize.starts.on_cube import surface_on_cube
-from parameterize.starts.start import Task
 from parameterize.surface.surface import surface_from_arrays
+from parameterize.ways.growth import GROWTH, LAST, SHARES, STIFF, first_cube
+from parameterize.ways.one_cube import surface_on_cube
+from parameterize.ways.task import MappingTask
 
 pytestmark = pytest.mark.usefixtures("few_distances")
 
@@ -33,7 +33,7 @@ def bent_rod(count=900):
 
 def on_cube(surface, config, seed=0):
     report = {"history": History(), "progress": ignore}
-    task = Task(surface, config, seed, "cpu", "float32", None, {}, report)
+    task = MappingTask(surface, config, seed, "cpu", "float32", None, {}, report)
     return surface_on_cube(task, turn=0)
 
 
@@ -106,7 +106,7 @@ def grown():
 
 @pytest.mark.parametrize(("rounds", "kept"), [(1, "spline-1-coarse"), (3, "spline-1")])
 def test_an_interrupted_growth_goes_on_to_the_same_bits(tmp_path, monkeypatch, rounds, kept):
-    monkeypatch.setattr("parameterize.starts.growth.SHARES", (0.1, 1.0))
+    monkeypatch.setattr("parameterize.ways.growth.SHARES", (0.1, 1.0))
     surface, config, whole = grown()
 
     def interrupt(state: Progress):

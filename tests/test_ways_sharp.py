@@ -8,18 +8,18 @@ from test_cube_constrained import drum
 from parameterize.config import preset
 from parameterize.progress import History, ignore
 from parameterize.run import parameterize
-from parameterize.starts.sharp import SHARP
-from parameterize.starts.start import Task
 from parameterize.surface.surface import surface_from_arrays
+from parameterize.ways.sharp import SHARP, ridges_of
+from parameterize.ways.task import MappingTask
 
 QUICK = preset("fast").scaled(0.1).with_control_points(7).with_blocks(1)
 
 
 def test_the_rims_of_a_drum_are_edges_of_the_cube():
-    vertices, faces = drum(72)  # sides: without the limit of one block it would be made of columns
+    vertices, faces = drum(72)  # sides: without the limit of one block it would be a stack
     result = parameterize(surface_from_arrays(vertices, faces, "drum"), QUICK)
     kept = result.quality.sharpness
-    assert [one.start for one in result.attempts] == ["sharp edges"] and result.origin == "extension"
+    assert [one.start for one in result.attempts] == ["sharp edges"] and result.origin == "sharp"
     assert result.certificate.verdict == "certified"
     assert kept.edges == 2 and kept.distance.rms < 5e-3
     on = np.flatnonzero(np.isin(vertices[:, 2], (0.0, 1.0)) & (np.arange(len(vertices)) < 144))
@@ -29,8 +29,8 @@ def test_the_rims_of_a_drum_are_edges_of_the_cube():
 
 def test_a_smooth_surface_has_too_few_ridges():
     surface = surface_from_arrays(*rounded_cube(400, 2.0), "ball")
-    task = Task(surface, QUICK, 0, "cpu", "float32", None, {}, {"history": History(), "progress": ignore})
-    assert task.ridges is None
+    task = MappingTask(surface, QUICK, 0, "cpu", "float32", None, {}, {"history": History(), "progress": ignore})
+    assert ridges_of(task) is None and not SHARP.suits(task).applies
 
 
 @pytest.mark.slow

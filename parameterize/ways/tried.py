@@ -1,21 +1,21 @@
-"""Describes the starts that were tried, and chooses the best of their maps."""
+"""Describes the ways that were tried, and chooses the best of their maps."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from .start import Attempt, Origin, Start
+from .way import Attempt, Way
 
 
 @dataclass(frozen=True)
 class AttemptReport:
-    """Describe the attempt of a start.
+    """Describe the attempt of a way.
 
     Attributes
     ----------
     start : str
-        The name of the start.
-    origin : "network", "growth", "extension", "blocks", "planes" or "columns"
-        The kind of start.
+        The name of the way.
+    origin : str
+        The kind of way: "network", "growth", "sharp", "blocks", "planes" or "stacks".
     ending : str
         Why its rounds ended.
     rounds : dict of str to int
@@ -32,7 +32,7 @@ class AttemptReport:
     """
 
     start: str
-    origin: Origin
+    origin: str
     ending: str
     rounds: dict[str, int]
     seconds: dict[str, float]
@@ -43,16 +43,21 @@ class AttemptReport:
 
 @dataclass(frozen=True)
 class Tried:
-    """Hold a start that was tried, its attempt (None where it did not suit the shape), and the wall seconds by step."""
+    """Hold a way that was tried, its attempt (None if it did not suit the shape), and the wall seconds by step."""
 
-    start: Start
+    way: Way
     attempt: Attempt | None
     seconds: dict[str, float]
 
     @property
+    def serves(self) -> bool:
+        """Return whether there is a map, and it is good enough."""
+        return self.attempt is not None and self.way.serves(self.attempt)
+
+    @property
     def fault(self) -> str:
-        """Return why another start follows, in words for the log and for report.json."""
-        if self.attempt is None and self.start.origin == "blocks":
+        """Return why another way follows, in words for the log and for report.json."""
+        if self.attempt is None and self.way.origin == "blocks":
             return "no blocks fit"
         if self.attempt is None:
             return "hard for the network" if "train" in self.seconds else "not trained"
@@ -62,17 +67,17 @@ class Tried:
         return "the boundary meets itself" if found.meets_itself else "not certified"
 
     def report(self) -> AttemptReport:
-        """Return the report of the start, for the result and for report.json."""
+        """Return the report of the way, for the result and for report.json."""
         seconds = {step: spent for step, spent in self.seconds.items() if step in ("train", "fit") and spent > 0.0}
-        start = self.start.name, self.start.origin
+        way = self.way.name, self.way.origin
         if self.attempt is None:
-            return AttemptReport(*start, self.fault, {}, seconds)
+            return AttemptReport(*way, self.fault, {}, seconds)
         found, course = self.attempt.found, self.attempt.course
         rounds, seconds = dict(course.rounds), seconds | course.seconds
-        return AttemptReport(*start, str(course.ending), rounds, seconds, *found.faults, self.attempt.distance)
+        return AttemptReport(*way, str(course.ending), rounds, seconds, *found.faults, self.attempt.distance)
 
 
-def best_of(tried: Iterable[Tried]) -> tuple[Start, Attempt] | None:
-    """Return the start and the attempt of the best map: fewest faults, then the least distance; None without a map."""
-    maps = [(one.start, one.attempt) for one in tried if one.attempt is not None]
+def best_of(tried: Iterable[Tried]) -> tuple[Way, Attempt] | None:
+    """Return the way and the attempt of the best map: fewest faults, then the least distance; None without a map."""
+    maps = [(one.way, one.attempt) for one in tried if one.attempt is not None]
     return min(maps, key=lambda one: one[1].rank, default=None)

@@ -1,11 +1,11 @@
-"""Starts from one block for a fat body, with stubs for its thin handles on the faces.
+"""The way to one block for a fat body, with stubs for its thin handles on the faces.
 
 The handles are cut off, the body without them is mapped as one cube, and rods are laid along the handles from face to
-face. The body is cut into blocks there, so that a rod is glued to a whole face. Without this start a mug stays folded.
+face. The body is cut into blocks there, so that a rod is glued to a whole face. Without this way a mug stays folded.
 """
 
 import logging
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -15,6 +15,7 @@ from ..checkpoint import Checkpoints
 from ..layouts.rods.along_skeleton import BlockLayout, LayoutError
 from ..layouts.rods.clearance import Clearance
 from ..layouts.stubs.cutting import without_handles
+from ..layouts.stubs.pieces import Handle, handles_of
 from ..layouts.stubs.stub_blocks import Footprint, footprint, stub_layout
 from ..optimization.endings import Course
 from ..optimization.reassignment import boundary_samples
@@ -27,35 +28,54 @@ from ..surface.errors import MeshError
 from ..surface.solid import Solid
 from ..surface.surface import surface_from_arrays
 from ..threads import one_blas_thread
-from .blocks import STIFF_WEIGHTS, nets_of, points_of, schedule, softened, surface_fit
+from .blocks import (
+    BLOCKS,
+    STIFF_WEIGHTS,
+    TUBE_OF_HANDLES,
+    handles_in_words,
+    nets_of,
+    points_of,
+    schedule,
+    softened,
+    surface_fit,
+)
 from .growth import GROWTH
-from .start import MOST_POINTS, Attempt, Start, Task, optimized
+from .task import MOST_POINTS, MappingTask
+from .way import Attempt, Suits, Way, optimized
 
 _log = logging.getLogger(__name__)
 
 _CONTROL_POINTS = 18  # a direction of the body's first map: it is optimised again with its handles
 _FACE_SHARES = (0.1,)  # as those of blocks along the skeleton: the body is there, only its handles have some way to go
 _POINT_SHARES = (0.1,)
+_CELL = 0.03  # of the lattice whose points tell the areas of sections, at volume 1
 _A_SPAN = 4  # samples of the body's faces among which rims find their places
 
 
-@dataclass(frozen=True)
-class WithStubs(Start):
+class WithStubs(Way):
     """Make a map of a body as one cube, cut into blocks, and of its handles as rods on their faces."""
 
-    def make(self, task: Task, checkpoints: Checkpoints) -> Attempt | None:
+    def suits(self, task: MappingTask) -> Suits:
+        """Return whether the body is fat, and all its handles are thin tubes that leave it and come back to it."""
+        if not task.surface.genus or task.skeleton.tube >= TUBE_OF_HANDLES or not _handles(task):
+            return Suits(False)
+        figures = f"{task.skeleton.tube:.2f} of the volume around its curves"
+        handles = f"{handles_in_words(task.skeleton)}, thin ones on a fat body"
+        return Suits(True, f"{handles}: {figures}: one block, with the handles on its faces")
+
+    def make(self, task: MappingTask, checkpoints: Checkpoints) -> Attempt | None:
         """Map the body without its handles, lay rods for these, and return the attempt with all blocks.
 
-        None is returned where they do not leave one body without handles, no rods fit, or more blocks would be needed
+        None is returned if they do not leave one body without handles, no rods fit, or more blocks would be needed
         than the options allow.
         """
         surface = task.surface
         with timed(task.seconds, "fit"), one_blas_thread():
             most = task.own + MOST_POINTS
-            found = without_handles(surface.unit_vertices, surface.faces, task.skeleton, task.handles, most)
-        if found is None:
+            trunk = without_handles(surface.unit_vertices, surface.faces, task.skeleton, _handles(task), most)
+        if trunk is None:
             return None
-        vertices, faces, rims = found
+        vertices, faces, rims = trunk
         try:
             body, earlier = _of_body(task, vertices, faces, checkpoints)
             with timed(task.seconds, "fit"), one_blas_thread():
@@ -69,10 +89,28 @@ class WithStubs(Start):
         return replace(made, course=made.course.after(earlier))
 
 
-BODY = WithStubs("body with stubs", "blocks", "mapping the body without its handles, and laying rods for these,")
+STUBS = WithStubs(
+    "body with stubs",
+    "blocks",
+    "mapping the body without its handles, and laying rods for these,",
+    BLOCKS.comes_from,
+)
 
 
-def _of_body(task: Task, vertices: Array, faces: IntArray, checkpoints: Checkpoints) -> tuple[SplineMap, Course]:
+def _handles(task: MappingTask) -> tuple[Handle, ...]:
+    """Return the thin handles of a fat body, as many as it has in all; () if they are thick, or there are none.
+
+    Raises SkeletonError for a body without a skeleton.
+    """
+
+    def find() -> tuple[Handle, ...]:
+        solid = Solid(task.surface.unit_vertices, task.surface.faces)
+        return handles_of(task.skeleton, solid.lattice(_CELL))
+
+    return task.fact("handles", find)
+
+
+def _of_body(task: MappingTask, vertices: Array, faces: IntArray, checkpoints: Checkpoints) -> tuple[SplineMap, Course]:
     """Return the map of the body without its handles, at the place of the whole body at volume 1, and its rounds.
 
     Raises MeshError where the surface without handles is none that can be mapped.
@@ -86,7 +124,7 @@ def _of_body(task: Task, vertices: Array, faces: IntArray, checkpoints: Checkpoi
     return spline.with_control(surface.from_unit(spline.control.T).T), grown.course
 
 
-def _with_stubs(task: Task, body: SplineMap, rims: list[tuple[Array, Array]]) -> SplineMap:
+def _with_stubs(task: MappingTask, body: SplineMap, rims: list[tuple[Array, Array]]) -> SplineMap:
     """Return the first map of all blocks: the body's, cut where its handles begin and end, and rods between these.
 
     Raises LayoutError where no rods fit, or more blocks are needed than the options allow.
@@ -94,7 +132,7 @@ def _with_stubs(task: Task, body: SplineMap, rims: list[tuple[Array, Array]]) ->
     surface, most = task.surface, task.config.blocks
     ends = [(_footprint(body, first), _footprint(body, last)) for first, last in rims]
     room = Clearance(task.skeleton, Solid(surface.unit_vertices, surface.faces))
-    layout, parts = stub_layout(body.volume, ends, task.handles, room)
+    layout, parts = stub_layout(body.volume, ends, _handles(task), room)
     if most is not None and len(layout) > most:
         raise LayoutError(f"a body with stubs needs {len(layout)} blocks, and at most {most} are allowed: allow more")
     return _first(layout, parts, task.config.spline.degree)

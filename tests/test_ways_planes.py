@@ -7,13 +7,12 @@ import pytest
 from plane_bodies import BODIES, arrays, prism
 
 import iga_nn
-from parameterize.attempts import COLUMNS, PLANES, STARTS, starts_of
 from parameterize.config import RefinementConfig, preset
 from parameterize.run import parameterize
 from parameterize.spline.body import Body
-from parameterize.starts.sharp import SHARP
-from parameterize.starts.start import Task
 from parameterize.surface.surface import surface_from_arrays
+from parameterize.ways.strategy import NETWORK, PLANES, SHARP, STACKS, WAYS, first_way
+from parameterize.ways.task import MappingTask
 
 QUICK = preset("fast").with_control_points(6)
 
@@ -23,14 +22,18 @@ def surface_of(name):
 
 
 def task_of(name, config=QUICK, corners=None):
-    return Task(surface_of(name), config, 0, "cpu", "float32", corners, {}, {})
+    return MappingTask(surface_of(name), config, 0, "cpu", "float32", corners, {}, {})
+
+
+def first(task):
+    return first_way(task, WAYS)[0]
 
 
 @pytest.mark.parametrize("name", ["frustum", "L", "tunnel"])
 def test_the_map_of_a_body_that_planes_bound_is_exact_and_certified(name, few_distances):
     result = parameterize(surface_of(name), QUICK)
     count = BODIES[name][1]
-    assert result.division == f"bounded by planes: {count} exact block{'s' * (count > 1)}"
+    assert result.decomposition == f"bounded by planes: {count} exact block{'s' * (count > 1)}"
     assert (result.origin, [one.ending for one in result.attempts]) == ("planes", ["exact"])
     assert result.certificate.verdict == "certified" and result.quality.boundary_check.injective is True
     assert result.quality.relative_distance.max < 1e-12 and result.quality.boundary.as_given.max < 1e-12
@@ -41,10 +44,10 @@ def test_the_map_of_a_body_that_planes_bound_is_exact_and_certified(name, few_di
 
 
 def test_the_options_and_the_corners_of_a_user_come_first():
-    assert starts_of(task_of("L")) == (PLANES,)
-    assert starts_of(task_of("frustum", QUICK.with_blocks(1))) == (PLANES,)
-    assert starts_of(task_of("L", QUICK.with_blocks(1))) == STARTS  # an L is no cube, and has a hollow
-    assert starts_of(task_of("frustum", corners=np.arange(8))) == (SHARP, *STARTS)
+    assert first(task_of("L")) is PLANES
+    assert first(task_of("frustum", QUICK.with_blocks(1))) is PLANES
+    assert first(task_of("L", QUICK.with_blocks(1))) is NETWORK  # an L is no cube, and has a hollow
+    assert first(task_of("frustum", corners=np.arange(8))) is SHARP
 
 
 def test_refinement_finds_nothing_to_do(few_distances):
@@ -52,13 +55,13 @@ def test_refinement_finds_nothing_to_do(few_distances):
     assert result.refinement.stopped == "tolerance met" and len(result.refinement.levels) == 1
 
 
-def test_a_tessellated_shaft_becomes_columns():
+def test_a_tessellated_shaft_becomes_stacked_blocks():
     surface = surface_from_arrays(*arrays(prism([(np.cos(t), np.sin(t)) for t in np.arange(80) * np.pi / 40], 2.0)))
-    assert starts_of(Task(surface, QUICK, 0, "cpu", "float32", None, {}, {})) == (COLUMNS,)
+    assert first(MappingTask(surface, QUICK, 0, "cpu", "float32", None, {}, {})) is STACKS
     result = parameterize(surface, QUICK)
-    assert (result.origin, [one.ending for one in result.attempts]) == ("columns", ["laid"])
+    assert (result.origin, [one.ending for one in result.attempts]) == ("stacks", ["laid"])
     assert result.certificate.verdict == "certified" and result.quality.as_dict()["boundary_injective"]
-    assert result.division.startswith("a stack of extrusions: 5 blocks, within ")
+    assert result.decomposition.startswith("a stack of extrusions: 5 blocks, within ")
     assert result.quality.relative_distance.max < 3e-4  # what chords are off a circle of 80 corners
 
 
@@ -75,6 +78,6 @@ def test_a_run_with_a_load_on_a_face(in_folder):
 def test_a_run_has_no_training_to_draw(in_folder, few_distances):
     mapping, poisson = iga_nn.MapOptions(control_points=6), iga_nn.PoissonOptions(refine=(0,))
     report = iga_nn.run("poisson", "cube", "out", mapping=mapping, poisson=poisson).report
-    assert report["parameterization"]["division"] == "bounded by planes: 1 exact block"
+    assert report["parameterization"]["decomposition"] == "bounded by planes: 1 exact block"
     assert "history.png" not in report.get("not_drawn", {}) and not (in_folder / "out" / "history.png").exists()
     assert len(set(report["estimate"]["seconds"])) == 1  # no training, and no rounds, that may be easy or hard

@@ -1,4 +1,4 @@
-"""Starts from thin blocks along the solid's skeleton, which the rounds draw to the surface.
+"""The way to thin blocks along the solid's skeleton, which the rounds draw to the surface.
 
 A body with handles is no image of one cube, and limbs are squeezed on it. Blocks with square sections along the
 branches of the curve skeleton, glued by whole faces at blocks where branches meet, follow both. The surface is not laid
@@ -6,6 +6,7 @@ out on them: its points take the nearest places on the blocks anew before each r
 """
 
 import logging
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,7 +15,8 @@ from ..arrays import Array, Knots
 from ..checkpoint import Checkpoints
 from ..config import Config, scaled_steps
 from ..cube.cutting import subdivide_finely
-from ..layouts.rods.along_skeleton import Block, BlockLayout, LayoutError
+from ..layouts.rods.along_skeleton import Block, BlockLayout, LayoutError, block_layout
+from ..layouts.skeleton.graph import Branch, Skeleton, SkeletonError
 from ..optimization.phases import Polish, Schedule, Separate, Unfold
 from ..optimization.reassignment import reassign
 from ..optimization.sliding import SlidingParameters
@@ -24,12 +26,13 @@ from ..progress import timed
 from ..spline.bspline import greville, open_uniform_knots
 from ..spline.control_nets import ControlNets
 from ..spline.spline_map import SplineMap
-from ..surface.geometry import vertex_quadrics, vertex_weights
+from ..surface.geometry import normals_and_areas, vertex_quadrics, vertex_weights
 from ..threads import one_blas_thread
-from .growth import STEPS, Grow
-from .kept_blocks import kept_blocks
-from .on_cube import MORE_ROUNDS
-from .start import MOST_POINTS, Attempt, Start, Task, optimized
+from .growth import GROWTH, STEPS, Grow
+from .laid import kept_blocks
+from .one_cube import MORE_ROUNDS
+from .task import MOST_POINTS, MappingTask
+from .way import Attempt, Suits, Way, optimized
 
 _log = logging.getLogger(__name__)
 
@@ -39,6 +42,13 @@ _LONGEST = 0.055  # length at volume 1 above which the mesh's edges are cut: abo
 # Until blocks have no fault: thin ones do not buckle, and far thinner parts of the body keep their small det J.
 STIFF_WEIGHTS = Weights(10.0 * Weights.fairness, least_floor=0.05)
 _SOFT_ROUNDS = 4  # with the usual weights, after a stiff map is certified
+# Share of the volume in the balls around the curves. A square rod has .79, and a rod twice as wide as thick .39:
+TUBE_OF_LIMBS = 0.7  # without handles one cube is possible, and is left for a body that is nearly all limbs: bodies
+# of round limbs have .75 to .97, and one with a fat trunk that the curves do not fill (a bunny) .65 and less
+TUBE_OF_HANDLES = 0.4  # with it blocks along all branches serve: square rods become sections twice as wide as thick
+LONG = 10.0  # median radii of the longest limb, to the middle of its junction: five diameters
+COMPACT = 4.0  # cubed area of the surface over 36 pi, at volume 1: bodies with less have no long limbs, and most have
+# less, so that these need not wait for a skeleton
 _FAR = 0.2  # root mean square distance from the surface beyond which a folded map is given up
 
 
@@ -50,20 +60,32 @@ class Approach(Grow):
     by_faces = True
 
 
-@dataclass(frozen=True)
-class AlongSkeleton(Start):
+class AlongSkeleton(Way):
     """Make a map of several blocks along the branches of the solid's skeleton."""
 
-    def make(self, task: Task, checkpoints: Checkpoints) -> Attempt | None:
+    def suits(self, task: MappingTask) -> Suits:
+        """Return whether the body has handles, or is nearly all limbs that are long, or the options ask for blocks."""
+        if task.surface.genus:
+            return Suits(True, _of_handles(task.skeleton))
+        if task.config.blocks is not None or task.given_corners is not None:
+            return Suits((task.config.blocks or 1) > 1)
+        if (figure := _compactness(task)) < COMPACT:
+            usual = f"no handles, and a compact body: {figure:.1f} for a ball's 1: one cube"
+            return Suits(False, usual, logging.DEBUG)
+        try:
+            return of_limbs(task.skeleton)
+        except SkeletonError as error:
+            return Suits(False, f"no handles, and no skeleton ({error}): one cube")
+
+    def make(self, task: MappingTask, checkpoints: Checkpoints) -> Attempt | None:
         """Lay thin blocks along the skeleton, draw them to the surface and return the attempt.
 
-        None is returned where no blocks fit into a body that one cube may suit, too, and other starts follow.
+        None is returned if no blocks fit into a body that one cube may suit, too, and other ways follow.
         """
         needed = task.surface.genus > 0 or task.config.blocks is not None
         with timed(task.seconds, "fit"), one_blas_thread():
             try:
-                degree = task.config.spline.degree
-                first = kept_blocks(checkpoints, task.choice, lambda: thin_blocks(task.layout, degree))
+                first = kept_blocks(checkpoints, lambda: thin_blocks(_layout(task), task.config.spline.degree))
             except LayoutError as error:
                 if needed:
                     raise
@@ -73,11 +95,76 @@ class AlongSkeleton(Start):
         stiff = optimized(first, fit, schedule(task.config), task, checkpoints, STIFF_WEIGHTS)
         return softened(stiff, task, checkpoints)
 
+    def serves(self, attempt: Attempt) -> bool:
+        """Return whether the map has no faults, and is close to the surface: one cube may be closer.
 
-BLOCKS = AlongSkeleton("blocks", "blocks", "laying blocks along the skeleton")
+        On a hand whose blocks span the slits between the fingers, 0.013 away back from the boundary, one cube is
+        closer.
+        """
+        both_ways = math.hypot(attempt.distance, attempt.distance_back) / math.sqrt(2.0)
+        return super().serves(attempt) and both_ways <= GROWTH.far
 
 
-def softened(stiff: Attempt, task: Task, checkpoints: Checkpoints) -> Attempt:
+BLOCKS = AlongSkeleton(
+    "blocks",
+    "blocks",
+    "laying blocks along the skeleton",
+    ("blocks along the skeleton", "glued by whole faces, and drawn to the surface"),
+)
+
+
+def of_limbs(skeleton: Skeleton) -> Suits:
+    """Return whether a body without handles is nearly all long limbs, by its skeleton."""
+    if max(skeleton.degrees) < 3:
+        return Suits(False, "no handles, and no place where limbs meet: one cube")
+    slender = max(_slenderness(branch) for branch in skeleton.branches if _is_limb(branch, skeleton))
+    figures = f"{skeleton.tube:.2f} of the volume around its curves, longest limb {slender:.1f} radii"
+    if skeleton.tube < TUBE_OF_LIMBS:
+        return Suits(False, f"no handles, and a fat trunk: {figures}: one cube")
+    if slender < LONG:
+        return Suits(False, f"no handles, and short limbs: {figures}: one cube")
+    return Suits(True, f"{np.sum(np.equal(skeleton.degrees, 1))} limbs: {figures}: blocks along them")
+
+
+def _of_handles(skeleton: Skeleton) -> str:
+    """Return why blocks along the branches suit a body with handles."""
+    figures = f"{skeleton.tube:.2f} of the volume around its curves"
+    if skeleton.tube >= TUBE_OF_HANDLES:
+        return f"{handles_in_words(skeleton)}, thick branches: {figures}: blocks along them"
+    return f"{handles_in_words(skeleton)}, flat branches: {figures}: blocks as wide as the body along them"
+
+
+def handles_in_words(skeleton: Skeleton) -> str:
+    """Return the number of handles in words."""
+    return "1 handle" if skeleton.handles == 1 else f"{skeleton.handles} handles"
+
+
+def _is_limb(branch: Branch, skeleton: Skeleton) -> bool:
+    """Return whether a branch ends in a tip."""
+    return min(skeleton.degrees[end] for end in branch.ends) == 1
+
+
+def _slenderness(branch: Branch) -> float:
+    """Return the length of a branch over its median radius."""
+    return branch.length / float(np.median(branch.radii))
+
+
+def _compactness(task: MappingTask) -> float:
+    """Return the cubed area of the surface at volume 1, over that of a ball."""
+    area = float(normals_and_areas(task.surface.unit_vertices, task.surface.faces)[1].sum())
+    return area**3 / (36.0 * math.pi)
+
+
+def _layout(task: MappingTask) -> BlockLayout:
+    """Return thin blocks along the skeleton. Raises SkeletonError and LayoutError if there are none."""
+    surface, most = task.surface, task.config.blocks
+    layout = block_layout(task.skeleton, surface.unit_vertices, surface.faces, task.spans_across, task.in_users_units)
+    if most is not None and len(layout) > most:
+        raise LayoutError(f"the skeleton needs {len(layout)} blocks, and at most {most} are allowed: allow more")
+    return layout
+
+
+def softened(stiff: Attempt, task: MappingTask, checkpoints: Checkpoints) -> Attempt:
     """Return what rounds with the usual weights make of a stiff map, or that map where they make it worse.
 
     They lower the distortion of seven bodies by 7 %, and their distance from the surface by 6 %.
@@ -127,7 +214,7 @@ def points_of(block: Block, knots: Knots, degree: int) -> Array:
     return np.moveaxis(block.points(places), -1, 0)
 
 
-def surface_fit(task: Task, first: SplineMap) -> Correspondence:
+def surface_fit(task: MappingTask, first: SplineMap) -> Correspondence:
     """Return the surface's points, each with its first place on the blocks."""
     surface = task.surface
     points, faces = subdivide_finely(surface.unit_vertices, surface.faces, _LONGEST, task.own + MOST_POINTS)

@@ -1,1 +1,0 @@
-"""Holds the starts, that is the ways to a first map, one a file."""

@@ -1,0 +1,1 @@
+"""Holds the ways to a map, one a file; strategy.py has their order."""

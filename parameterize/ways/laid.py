@@ -1,0 +1,115 @@
+"""What ways have in common whose blocks are left as they are laid, and the checkpoint of blocks that are laid."""
+
+from abc import abstractmethod
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import asdict
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..checkpoint import Checkpoints
+from ..cube.boundary_map import on_faces
+from ..optimization.certified_map import CertifiedMap
+from ..optimization.endings import Course, Reason
+from ..optimization.sliding import SlidingParameters
+from ..optimization.surface_distance import TANGENTIAL, Correspondence
+from ..optimization.term import Weights
+from ..progress import timed
+from ..quality.distances import nearest_on_boundary
+from ..spline.control_nets import ControlNets
+from ..spline.interface import Interface
+from ..spline.sampled_boundary import SampledBoundary
+from ..spline.spline_map import SplineMap
+from ..spline.volume import FACE_NAMES
+from ..surface.geometry import vertex_quadrics, vertex_weights
+from ..threads import one_blas_thread
+from .cost import Cost
+from .task import MappingTask
+from .way import Attempt, Way
+
+_CHECKPOINT = "first"
+
+
+class Laid(Way):
+    """Make a map of blocks that are proved before the way suits: it is certified and left as it is."""
+
+    why: ClassVar[Reason]  # of its end
+
+    @abstractmethod
+    def lay(self, task: MappingTask) -> SplineMap:
+        """Return the map at volume 1 of a body that the way suits."""
+
+    def make(self, task: MappingTask, checkpoints: Checkpoints) -> Attempt:
+        """Return the attempt whose map is left as it is laid, which a checkpoint keeps."""
+        with timed(task.seconds, "fit"), one_blas_thread():
+            first = kept_blocks(checkpoints, lambda: self.lay(task))
+            fit = _surface_fit(task, first)
+        with timed(task.seconds, "optimize"), one_blas_thread():
+            laid = CertifiedMap.of(first)
+        return Attempt(laid, Course(Counter(), {}, self.why), fit, Weights())
+
+    def serves(self, attempt: Attempt) -> bool:
+        """Return True: no other way makes a better map than proved blocks."""
+        return True
+
+    def cost(self, task: MappingTask) -> Cost:
+        """Return the cost of the certificate."""
+        return Cost.of_certificate(float(len(self.lay(task).control[0])), task.config)
+
+
+def in_words(count: int, kind: str = "") -> str:
+    """Return a number of blocks in words."""
+    return f"{count} {kind}block{'s' * (count > 1)}"
+
+
+def _surface_fit(task: MappingTask, first: SplineMap) -> Correspondence:
+    """Return the surface's vertices with their places on the blocks, in double precision."""
+    points, faces = task.surface.to_unit(task.surface.vertices), task.surface.faces
+    body = first.body
+    patches, parameters, _ = nearest_on_boundary(points, body, SampledBoundary.of(body))
+    outer = np.array([[name in names for name in FACE_NAMES] for names in body.outer])
+    owners = 6 * patches + np.argmax(on_faces(parameters) & outer[patches], axis=1)
+    return Correspondence(
+        SlidingParameters(first.nets, parameters, owners, faces),
+        points,
+        vertex_quadrics(points, faces, TANGENTIAL),
+        vertex_weights(points, faces, task.own),
+    )
+
+
+def kept_blocks(checkpoints: Checkpoints, lay: Callable[[], SplineMap]) -> SplineMap:
+    """Return the first map of blocks of the checkpoint; if there is none, lay it and keep it.
+
+    To find them may take minutes, and a run that resumes finds them again here.
+    """
+    if (saved := checkpoints.load(_CHECKPOINT)) is not None:
+        return _loaded(*saved)
+    first = lay()
+    nets = first.nets
+    arrays = {
+        "control": first.control,
+        "knots": np.concatenate([row for knots in nets.knots for row in knots]),
+        "lengths": np.array([[len(row) for row in knots] for knots in nets.knots]),
+    }
+    state = {"degree": nets.degree, "interfaces": [asdict(one) for one in nets.interfaces]}
+    checkpoints.save(_CHECKPOINT, arrays, state)
+    return first
+
+
+def _loaded(arrays: dict[str, NDArray[Any]], state: dict[str, Any]) -> SplineMap:
+    """Return the map of a checkpoint."""
+    lengths = arrays["lengths"]
+    rows = np.split(arrays["knots"], np.cumsum(lengths.ravel())[:-1])
+    knots = tuple((rows[k], rows[k + 1], rows[k + 2]) for k in range(0, len(rows), 3))
+    interfaces = tuple(_interface(**values) for values in state["interfaces"])
+    return SplineMap(ControlNets(state["degree"], knots, interfaces), arrays["control"])
+
+
+def _interface(first: list[Any], second: list[Any], swapped: bool, flipped: list[bool]) -> Interface:
+    """Return an interface from the values of its fields as JSON has them."""
+    p, face_p = first
+    q, face_q = second
+    a, b = flipped
+    return Interface((p, face_p), (q, face_q), swapped, (a, b))
