@@ -28,12 +28,12 @@ def test_the_table_has_a_row_a_part(tmp_path):
         edge_max=4.76e-4,
         normals_mean=0.731,
         seconds=27.8,
-        origin="extension",
+        origin="sharp",
     )
     refused = cad.Row("shaft", "too thin")
     text = cad.as_text([ring, refused], options(tmp_path, "cylinder", "shaft", "tee", control_points=20))
     assert cells(text, "cylinder") == [
-        ["cylinder", "96", "1", "extension", "certified", "yes", "8.0e-04", "7.8e-05", "4.8e-04", "0.73", "28"]
+        ["cylinder", "96", "1", "sharp", "certified", "yes", "8.0e-04", "7.8e-05", "4.8e-04", "0.73", "28"]
     ]
     assert cells(text, "shaft")[0][4] == "too thin"
     assert "Certified and one-to-one 1 of 2." in text and "Not finished yet: 1 of 3" in text

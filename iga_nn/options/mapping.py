@@ -7,10 +7,8 @@ from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any, Literal
 
-from parameterize.config import Config, Device, PresetName, RefinementConfig, SplineConfig
+from parameterize.config import Config, Device, PresetName, RefinementConfig, SplineConfig, WayName
 from parameterize.config import preset as config_of
-
-from parameterize.config import WayName
 
 from ..errors import InputError, input_errors
 from ..type_check import Checked
