@@ -11,6 +11,7 @@ import numpy as np
 from parameterize.arrays import Array, in_brackets
 from parameterize.spline.volume import FACE_NAMES
 
+from .discretization.boundary import face_rule, has_face
 from .discretization.space import TrialSpace
 from .discretization.unknowns import Unknowns
 from .discretization.weak import WeakFace
@@ -84,7 +85,7 @@ def balance(
     reactions, own = _of_faces(patches, unknowns.on_fixed(residuals)), np.zeros(components)
     supports = _supports(problem)
     for patch, full in zip(patches, coefficients, strict=True):
-        outside = _add_regions(patch.problem, patch.weak, full, supports)
+        outside = _add_regions(patch.problem, patch.weak, full, supports) + _add_robin_faces(patch, full, supports)
         lifted = sum(((f.weights * f.gamma * f.values).sum(axis=1) for f in patch.weak), np.zeros(components))
         own = own + patch.loads.sum(axis=(1, 2, 3)) - lifted - outside
     load = space.total(own)
@@ -135,6 +136,20 @@ def _has_end(space: TrialSpace, name: str) -> bool:
 def _supports(problem: BoundaryValueProblem) -> dict[str, Array]:
     """Return zero for each support on a region, by its role."""
     return {c.role: np.zeros(problem.form.components) for c in problem.conditions if c.is_support and not c.is_strong}
+
+
+def _add_robin_faces(patch: PatchSystem, coefficients: Array, found: dict[str, Array]) -> Array:
+    """Add the reactions of whole faces with Robin data, and return their flux into a body of u = 0."""
+    outside = np.zeros(len(coefficients))
+    for name in (name for one in patch.problem.faces if one.factor is not None for name in one.faces):
+        force = found.setdefault(patch.problem.prefix + name, np.zeros(len(coefficients)))
+        if has_face(patch.space, name):
+            face = face_rule(patch.volume, patch.space, name)
+            alpha, given = patch.problem.on_face(name, face.points, face.normal)
+            u = np.stack([face.bases[0] @ component[face.layer] @ face.bases[1].T for component in coefficients])
+            force += ((given - alpha * u) * face.measure).sum(axis=(1, 2))
+            outside += (given * face.measure).sum(axis=(1, 2))
+    return outside
 
 
 def _add_regions(
