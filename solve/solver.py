@@ -179,7 +179,7 @@ def _on_patches(
 
 def _demand_known_patches(body: Body, problem: BoundaryValueProblem) -> None:
     """Raise ValueError for data of faces that are not outer faces of the body, and of patches that it does not have."""
-    outer = {body.face_name(i, face) for i, faces in enumerate(body.outer) for face in faces}
+    outer = {body.face_name(*face) for face in body.outer_faces}
     if unknown := sorted(problem.patch_faces - outer):
         faces = "u0 to w1" if body.is_single else ", ".join(sorted(outer))
         raise ValueError(f"{unknown[0]} is no outer face of the body; its faces are {faces}")

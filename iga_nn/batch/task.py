@@ -1,6 +1,5 @@
 """Computes one surface of a batch in a worker process, and reports its progress to the client."""
 
-import logging
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -55,7 +54,7 @@ def compute(task: Task, number: int, batch: str) -> Ended:
         }
         return pipeline.parameterize_to(task.mesh, task.folder, progress=progress, **given)
 
-    with logged(logging.NullHandler()):  # warnings are in the report: a surface has one line on the terminal
+    with logged(lambda _: None):  # warnings are in the report: a surface has one line on the terminal
         return ended(run, LESS_MEMORY)
 
 

@@ -91,7 +91,7 @@ def _run(mesh: str, output: OutputOptions, mapping: MapOptions, problem_options:
             paints_beside=True,
             **output.folder,
         )
-    return _finish(outcome, output)
+    return _tell(outcome, output)
 
 
 @for_each_problem(batch_app, is_default=True)
@@ -152,17 +152,12 @@ def solve_problem(
     Args:
         device: where the linear system is solved; cuda takes Poisson's equation alone.
     """
-    return _solve(volume, output, problem_options, mpi, device)
-
-
-def _solve(volume: Path, output: OutputOptions, problem_options: ProblemOptions, mpi: bool, device: str) -> int:
-    """Solve a problem on a volume, print the verdict and return the exit code."""
     from ..workflow import mpi_job, pipeline
 
     with shown_progress(output.quiet):
         comm = mpi_job.all_processes() if mpi else None
         outcome = pipeline.solve_to(volume, problem_options=problem_options, device=device, comm=comm, **output.folder)
-    return DONE if outcome is None else _finish(outcome, output)
+    return DONE if outcome is None else _tell(outcome, output)
 
 
 @for_each_problem(study_app, is_default=True, hidden=OF_STUDY)
@@ -184,7 +179,7 @@ def study_volume(
         outcome, table = pipeline.study_to(
             volume, problem_options=problem_options, study_options=study, **output.folder
         )
-    return _tell(outcome, output, outcome.report.get("study"), table)
+    return _tell(outcome, output, table, outcome.report.get("study"))
 
 
 @app.command(name="modes")
@@ -200,16 +195,16 @@ def find_modes(
 
     with shown_progress(output.quiet):
         outcome, table = pipeline.modes_to(volume, modes_options=modes, **output.folder)
-    return _tell(outcome, output, None, table)
+    return _tell(outcome, output, table)
 
 
-def _tell(outcome: Outcome, output: OutputOptions, found: dict[str, Any] | None, table: str) -> int:
-    """Print a table, or with --json what was found; the verdict where nothing was solved. Return the exit code."""
+def _tell(outcome: Outcome, output: OutputOptions, table: str = "", section: dict[str, Any] | None = None) -> int:
+    """Print a table, or with --json a section; the verdict if there is none of these. Return the exit code."""
     from ..report import document as reports
     from .answer import exit_code, verdict_in_words
 
     if output.as_json:
-        _print(reports.as_json(found or reports.verdict(outcome.report, outcome.folder)))
+        _print(reports.as_json(section or reports.verdict(outcome.report, outcome.folder)))
     else:
         _print(f"{table}\nresults in {outcome.folder}" if table else verdict_in_words(outcome))
     return exit_code(outcome.report)
@@ -396,16 +391,6 @@ def _processes(argv: list[str]) -> AbstractContextManager[None]:
     from ..workflow import mpi_job
 
     return mpi_job.together(mpi_job.all_processes())
-
-
-def _finish(outcome: Outcome, output: OutputOptions) -> int:
-    """Print the verdict and return the exit code."""
-    from ..report import document as reports
-    from . import answer
-
-    verdict = reports.verdict(outcome.report, outcome.folder)
-    _print(reports.as_json(verdict) if output.as_json else answer.verdict_in_words(outcome))
-    return answer.exit_code(outcome.report)
 
 
 def _print(text: str) -> None:

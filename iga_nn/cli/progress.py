@@ -92,22 +92,15 @@ def describe(progress: Progress) -> str:
     return f"{folds}{left}, loss {progress.loss:.3e}"
 
 
-class _ConsoleHandler(logging.Handler):
-    """Print log records as single lines above the bar; a repeated warning is printed once."""
-
-    def __init__(self, console: Console) -> None:
-        super().__init__()
-        self._console = console
-        self._warned: set[str] = set()
-
-    def emit(self, record: logging.LogRecord) -> None:
-        text = record.getMessage()
-        if record.levelno >= logging.WARNING:
-            if text in self._warned:
-                return
-            self._warned.add(text)
-            text = f"{record.levelname.lower()}: {text}"
-        self._console.print(Text(text), soft_wrap=True)
+def _print(console: Console, warned: set[str], record: logging.LogRecord) -> None:
+    """Print a log record as a single line above the bar; a repeated warning is printed once."""
+    text = record.getMessage()
+    if record.levelno >= logging.WARNING:
+        if text in warned:
+            return
+        warned.add(text)
+        text = f"{record.levelname.lower()}: {text}"
+    console.print(Text(text), soft_wrap=True)
 
 
 @contextmanager
@@ -128,7 +121,7 @@ def shown_batch(quiet: bool) -> Iterator[BatchProgress | None]:
 def _shown(quiet: bool, *columns: ProgressColumn) -> Iterator[Show | None]:
     """Show the log of the packages on stderr, and yield the callback of its progress bar; None where `quiet`."""
     console = Console(file=sys.stderr, highlight=False)
-    with logged(_ConsoleHandler(console), logging.WARNING if quiet else logging.INFO):
+    with logged(partial(_print, console, set()), logging.WARNING if quiet else logging.INFO):
         if quiet:
             yield None
             return

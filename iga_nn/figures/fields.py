@@ -80,8 +80,7 @@ def points_on(volume: BSplineVolume, grid: Grid) -> Array:
 
 def outer_faces(body: BodyLike) -> list[int]:
     """Return the places of the faces that are not glued among the nine faces and sections of each patch."""
-    each = enumerate(as_body(body).outer)
-    return [PER_PATCH * i + FACE_NAMES.index(name) for i, names in each for name in names]
+    return [PER_PATCH * patch + FACE_NAMES.index(face) for patch, face in as_body(body).outer_faces]
 
 
 @dataclass(frozen=True, eq=False)

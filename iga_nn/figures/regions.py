@@ -38,8 +38,7 @@ def draw_conditions(path: str | Path | None, body: BodyLike, conditions: Sequenc
     palette, rows = _palette(len(conditions)), np.linspace(0.0, 1.0, SAMPLES)
     patches = []
     glued = as_body(body)
-    faces = [(i, name) for i, names in enumerate(glued.outer) for name in names]
-    for number, name in faces:
+    for number, name in glued.outer_faces:
         x, normal = face_geometry(glued.patches[number], [rows] * 3, *axis_side(name))
         points = np.asarray(x)
         units = normal / np.linalg.norm(normal, axis=0)

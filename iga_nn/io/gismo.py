@@ -191,8 +191,7 @@ def _with_topology(body: Body) -> Element:
     node = SubElement(root, "MultiPatch", parDim="3", id="0")
     SubElement(node, "patches", type="id_range").text = f"{FIRST_ID} {FIRST_ID + len(body) - 1}"
     SubElement(node, "interfaces").text = "\n".join(" ".join(map(str, _row(one))) for one in body.interfaces)
-    outer = [(patch, face) for patch, faces in enumerate(body.outer) for face in faces]
-    sides = [f"{FIRST_ID + patch} {FACE_NAMES.index(face) + 1}" for patch, face in outer]
+    sides = [f"{FIRST_ID + patch} {FACE_NAMES.index(face) + 1}" for patch, face in body.outer_faces]
     SubElement(node, "boundary").text = "\n".join(sides)
     return root
 

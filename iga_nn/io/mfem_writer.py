@@ -9,7 +9,7 @@ MFEM would take det J for the weight of its integrals.
 """
 
 import logging
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -52,7 +52,7 @@ def write_mfem(path: Path, volume: BodyLike, solution: SplineField | None = None
     for patch, place, row in zip(body, places, own, strict=True):
         rows[place], weights[place] = patch.control_points, row
     _demand_one_weight([weights[place] for place in places], own)
-    boundary = [(6 * number + ATTRIBUTES.index(face) + 1, number, face) for number, face in _outer(body)]
+    boundary = [(6 * number + ATTRIBUTES.index(face) + 1, number, face) for number, face in body.outer_faces]
     sections = {
         "dimension": ["3"],
         "elements": _counted(f"{p + 1} {CUBE} {_joined(row)}" for p, row in enumerate(layout.hexahedra)),
@@ -118,13 +118,6 @@ def _between(interface: Interface, left: Sequence[bool]) -> Interface:
             flipped[along] = not flipped[along]  # w is the second direction along its other faces
         ends.append((patch, face))
     return replace(interface, first=ends[0], second=ends[1], flipped=(flipped[0], flipped[1]))
-
-
-def _outer(body: Body) -> Iterator[tuple[int, str]]:
-    """Yield patch and name of the faces that are not glued."""
-    for number, faces in enumerate(body.outer):
-        for face in faces:
-            yield number, face
 
 
 def _joined(row: Array | IntArray) -> str:

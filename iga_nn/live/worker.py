@@ -107,17 +107,5 @@ def _work(
             name, mapping=mapping, problem_options=problem_options, progress=throttled(tell, halt.is_set)
         )
 
-    with logged(_Lines(sender), logging.INFO):
+    with logged(lambda record: sender.send(record.getMessage()), logging.INFO):
         sender.send(ended(work, "lower --control-points or --refine"))
-
-
-class _Lines(logging.Handler):
-    """Sends the lines of the log."""
-
-    def __init__(self, sender: Connection) -> None:
-        super().__init__()
-        self._sender = sender
-
-    def emit(self, record: logging.LogRecord) -> None:
-        """Send a line."""
-        self._sender.send(record.getMessage())

@@ -5,8 +5,10 @@ from typing import Any
 import numpy as np
 
 from parameterize.arrays import Array, IntArray, in_brackets
+from parameterize.certificate.body import Certificate
 from parameterize.certificate.jacobian import PatchCertificate
 from parameterize.config import MAX_CONTROL_POINTS
+from parameterize.spline.body import Body
 from parameterize.spline.bspline import midpoints
 from parameterize.spline.volume import BSplineVolume
 
@@ -42,6 +44,29 @@ def unproved(volume: BSplineVolume, certificate: PatchCertificate) -> dict[str, 
     if certificate.flat is not None:
         found["flat"] = volume(certificate.flat)[0].tolist()
     return {"unproved": found}
+
+
+def with_unproved(section: Report, body: Body, certificate: Certificate) -> Report:
+    """Return a section with the places without a proof: of a volume, or of each patch under `patches` and in all."""
+    if body.is_single:
+        return section | unproved(body.only, certificate.only)
+    parts = zip(section["patches"], body, certificate.patches, strict=True)
+    each = [known | unproved(patch, own) for known, patch, own in parts]
+    return section | {"patches": each} | _in_all(each)
+
+
+def _in_all(each: list[Report]) -> dict[str, Any]:
+    """Return the number of spans without a proof on all patches, and a place of each patch that has some."""
+    found = [own["unproved"] for own in each if "unproved" in own]
+    if not found:
+        return {}
+    return {"unproved": {"spans": sum(own["spans"] for own in found), "places": [own["places"][0] for own in found]}}
+
+
+def unproved_places(body: Body, certificate: Certificate) -> Array:
+    """Return the images (k, 3) of the midpoints of all spans without a proof, in the body's units."""
+    parts = zip(body, certificate.patches, strict=True)
+    return np.concatenate([span_places(patch, own.unproved) for patch, own in parts])
 
 
 def what_to_try(report: Report, mapping: MapOptions | None = None) -> list[str]:

@@ -94,10 +94,10 @@ def claim(report: Report) -> str:
     return CLAIMS[hands.pop()] if len(hands) == 1 else "one sign of det J"
 
 
-def size_in_words(quality: Report) -> str:
+def size_in_words(quality: Report, sign: str = " × ") -> str:
     """Return the number of control points: of a volume in each direction, of several patches in all."""
-    found = quality["control_points"]
-    return f"{found:,}" if isinstance(found, int) else " × ".join(map(str, found))
+    count = quality["control_points"]
+    return f"{count:,}" if isinstance(count, int) else sign.join(map(str, count))
 
 
 def is_converged(report: Report) -> bool:
@@ -167,22 +167,18 @@ def control_points_in_words(report: Report) -> str:
     if not (refinement := report["parameterization"].get("refinement")):
         return ""
     first, last, asked = refinement["levels"][0], refinement["levels"][-1], f"tolerance {refinement['tolerance']:.2g}"
+    size = size_in_words(last, " x ")
     reason = f"{asked} met"
     if refinement["stopped"] == "limit reached":
         reason = f"{asked} not met with at most {refinement['max_control_points']} per direction"
     elif refinement["stopped"] == "no better map":
-        reason = f"{asked} not met: no better map that is certified was found with {_size(refinement['dropped'])}"
-    start = f", {_size(first)} at first" if first != last else ""
+        dropped = size_in_words(refinement["dropped"], " x ")
+        reason = f"{asked} not met: no better map that is certified was found with {dropped}"
+    start = f", {size_in_words(first, ' x ')} at first" if first != last else ""
     if "boundary" in last:  # of an older version, which knew the distance at the mesh's vertices alone
-        return f"{_size(last)}{start}; rms distance {last['boundary']:.2g} of the diagonal at the vertices, {reason}"
+        return f"{size}{start}; rms distance {last['boundary']:.2g} of the diagonal at the vertices, {reason}"
     rms, largest = f"rms distance {last['distance']:.2g} of the diagonal", f"largest distance {last['largest']:.2g}"
-    return f"{_size(last)}{start}; {rms}, {reason}; {largest}"
-
-
-def _size(level: Report) -> str:
-    """Return the number of control points of a map: of one cube in each direction, of several blocks in all."""
-    found = level["control_points"]
-    return f"{found:,}" if isinstance(found, int) else " x ".join(map(str, found))
+    return f"{size}{start}; {rms}, {reason}; {largest}"
 
 
 def surface_distance(report: Report) -> Report:

@@ -18,7 +18,7 @@ from parameterize.old_names import ORIGINS
 from ..errors import one_line
 from ..level_table import TITLES, as_rows, capitalized
 from ..rounding import rounded
-from . import balance, extremes, patches
+from . import balance, extremes
 from . import document as reports
 from .advice import in_words
 from .artifacts import PAGE, REGIONS, SOLVED, figures_of
@@ -79,7 +79,7 @@ def page(report: Report, scene: dict[str, Any] | None, folder: Path) -> str:
         regions=regions_of(report),
         levels=_levels(section),
         extremes=extremes.table(section),
-        patches=patches.table(report["parameterization"]),
+        patches=_patches(report["parameterization"]),
         notices=notices(report),
         figures=[(heading, image) for file, heading, image in drawn if file != REGIONS],
         where=[(heading, image) for file, heading, image in drawn if file == REGIONS],
@@ -197,6 +197,27 @@ def _levels(section: Report) -> list[list[str]]:
     if rows and (unit := section.get("unit")):
         rows[0] = [f"h [{unit}]" if title == TITLES["h"] else title for title in rows[0]]
     return rows
+
+
+def _patches(quality: Report) -> list[list[str]]:
+    """Return the table of several patches: the titles of what is known, then a row a patch; no row for a volume."""
+    rows = [{"patch": f"p{number}", **_patch(patch)} for number, patch in enumerate(quality.get("patches", ()))]
+    return [list(rows[0]), *(list(row.values()) for row in rows)] if rows else []
+
+
+def _patch(patch: Report) -> dict[str, str]:
+    """Return what is proved of a patch and, where it was measured against its own box, how much it distorts this."""
+    bound = patch["det_lower_bound"]
+    proof = "–" if patch["bijective"] != "certified" or bound is None else f"≥ {bound:.3g} of its mean"
+    found = {"control points": reports.size_in_words(patch), "det J": patch["bijective"], "|det J|": proof}
+    if "own_box" not in patch:
+        return found
+    return found | {
+        "own box": " × ".join(f"{side:.3g}" for side in patch["own_box"]),
+        "ARAP, mean": f"{patch['arap']['mean']:.3g}",
+        "largest": f"{patch['arap']['max']:.3g}",
+        "least scaled det J": f"{patch['scaled_jacobian']:.3g}",
+    }
 
 
 def notices(report: Report) -> list[str]:

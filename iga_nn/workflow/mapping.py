@@ -31,8 +31,8 @@ from ..io.formats import load_volume
 from ..models import resolve
 from ..options import MapOptions
 from ..report import document as reports
+from ..report.advice import unproved_places, with_unproved
 from ..report.artifacts import SOLVED
-from ..report.patches import unproved_places, with_unproved
 from ..rounding import rounded
 from .cost_estimate import Forecast, forecast, warn_of_memory
 from .output_folder import CHECKPOINT, RunFolder, changed_file, digest, has_checkpoint

@@ -24,6 +24,7 @@ from parameterize.files import unfinished
 from ..report.artifacts import files_of
 from . import drawing
 from .drawing import Failures, Figures
+from .worker_run import Told
 
 log = logging.getLogger(__name__)
 
@@ -98,15 +99,16 @@ def main() -> None:
     os.dup2(2, 1)  # what libraries print is no answer
     given: SimpleQueue[Figures] = SimpleQueue()
     Thread(target=_read, args=(sys.stdin.buffer, given), daemon=True).start()
-    warnings = _Warnings()
-    logging.getLogger("iga_nn").addHandler(warnings)
+    warnings: list[str] = []  # which the run tells
+    logging.getLogger("iga_nn").addHandler(Told(lambda record: warnings.append(record.getMessage()), logging.WARNING))
     logging.getLogger("iga_nn").propagate = False
     with suppress(Exception):  # what fails now fails again where it is needed, and is told
         _can_draw()
         import_module("iga_nn.figures.solution")
     while True:
         failures = drawing.draw(given.get(), _can_draw)
-        pickle.dump((failures, warnings.taken()), answers)
+        pickle.dump((failures, warnings), answers)
+        warnings.clear()
         answers.flush()
 
 
@@ -133,23 +135,6 @@ def _can_draw() -> bool:
     if not done:
         log.warning("no figures: %s", CANNOT_DRAW)
     return done
-
-
-class _Warnings(logging.Handler):
-    """Keeps warnings, which the run tells."""
-
-    def __init__(self) -> None:
-        super().__init__(logging.WARNING)
-        self._kept: list[str] = []
-
-    def emit(self, record: logging.LogRecord) -> None:
-        """Keep a line."""
-        self._kept.append(record.getMessage())
-
-    def taken(self) -> list[str]:
-        """Return the lines since the last call."""
-        kept, self._kept = self._kept, []
-        return kept
 
 
 if __name__ == "__main__":

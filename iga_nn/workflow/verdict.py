@@ -14,7 +14,6 @@ from parameterize.spline.body import BodyLike, as_body
 from ..options import MapOptions
 from ..report import advice
 from ..report import document as reports
-from ..report.patches import with_unproved
 from .output_folder import RunFolder, digest
 
 log = logging.getLogger(__name__)
@@ -26,7 +25,7 @@ def certified_facts(volume: BodyLike) -> dict[str, Any]:
     with compilation_told():
         certificate = certify(body)
         facts = proved(body, certificate, check_boundary(body))
-    return with_unproved(facts, body, certificate)
+    return advice.with_unproved(facts, body, certificate)
 
 
 def write_certificate(state: RunFolder, path: Path, body: BodyLike, command: str) -> None:

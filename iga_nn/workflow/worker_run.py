@@ -73,9 +73,22 @@ def throttled(tell: Callable[[Progress], None], is_stopped: Callable[[], bool]) 
     return step
 
 
+class Told(logging.Handler):
+    """Give the records of a log to a function."""
+
+    def __init__(self, tell: Callable[[logging.LogRecord], object], level: int = logging.NOTSET) -> None:
+        super().__init__(level)
+        self._tell = tell
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Give a record to the function."""
+        self._tell(record)
+
+
 @contextmanager
-def logged(handler: logging.Handler, level: int = logging.NOTSET) -> Iterator[None]:
-    """Send the log of the block to one handler only; the level NOTSET leaves the present level unchanged."""
+def logged(tell: Callable[[logging.LogRecord], object], level: int = logging.NOTSET) -> Iterator[None]:
+    """Give the log of the block to one function only; the level NOTSET leaves the present level unchanged."""
+    handler = Told(tell)
     loggers = [logging.getLogger(name) for name in LOGGERS]
     before = [(logger.level, logger.propagate) for logger in loggers]
     for logger in loggers:

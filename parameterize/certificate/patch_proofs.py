@@ -75,7 +75,7 @@ def boundary_pieces(body: Body) -> Pieces:
     degree = max(max(patch.degrees) for patch in body)
     is_rational = any(patch.weights is not None for patch in body)
     nets = [patch.homogeneous if is_rational else patch.control_points for patch in body]
-    faces = [(k, *axis_side(name)) for k, names in enumerate(body.outer) for name in names]
+    faces = [(k, *axis_side(name)) for k, name in body.outer_faces]
     parts = [_face_pieces(body.patches[k], nets[k], axis, side, degree) for k, axis, side in faces]
     patches = np.repeat([k for k, _, _ in faces], [len(found) for _, _, found in parts])
     return Pieces(0, SharedPoints(body), patches, *(np.concatenate(arrays) for arrays in zip(*parts, strict=True)))

@@ -45,7 +45,7 @@ def _parts(body: Body) -> IntArray:
 def _shells(body: Body) -> list[list[BoundaryFace]]:
     """Return the shells, each a list of its faces. Faces with a common edge are in one shell."""
     numbers, count = shared_numbers([(3, 3, 3)] * len(body), body.interfaces)  # a number for the middle of each edge
-    faces = [(k, name) for k, names in enumerate(body.outer) for name in names]
+    faces = body.outer_faces
     pairs = [
         (i, len(faces) + edge) for i, (k, name) in enumerate(faces) for edge in face_layer(numbers[k], name).flat[1::2]
     ]

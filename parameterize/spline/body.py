@@ -251,6 +251,11 @@ class Body(Brief, Shown):
         glued = {face for interface in self.interfaces for face in (interface.first, interface.second)}
         return tuple(tuple(name for name in FACE_NAMES if (i, name) not in glued) for i in range(len(self.patches)))
 
+    @property
+    def outer_faces(self) -> list[Face]:
+        """Return patch and name of the faces that are not glued."""
+        return [(patch, face) for patch, faces in enumerate(self.outer) for face in faces]
+
     def __len__(self) -> int:
         return len(self.patches)
 
