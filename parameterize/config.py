@@ -16,17 +16,10 @@ MAX_CONTROL_POINTS = 100  # per direction
 StageName = Literal["S(2)", "S(1)", "cube", "corners", "edges"]
 PresetName = Literal["fast", "grown", "paper"]
 Device = Literal["auto", "cpu", "cuda"]  # where the network is trained; "auto" takes CUDA where it is available
+# The ways as the command line writes them; `ways/strategy.py` says which body takes which.
 WayName = Literal[
-    "planes",
-    "stacks",
-    "body-with-stubs",
-    "blocks",
-    "sharp-edges",
-    "network",
-    "growth",
-    "stiff-growth",
-    "last-growth",
-]  # as the command line writes them; `ways/strategy.py` says which body takes which
+    "planes", "stacks", "body-with-stubs", "blocks", "sharp-edges", "network", "growth", "stiff-growth", "last-growth"
+]
 
 
 @dataclass(frozen=True)

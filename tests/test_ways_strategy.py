@@ -197,7 +197,7 @@ def test_the_command_line_lists_the_ways_it_refuses_to_know(in_folder, capsys):
     )
 
 
-OWN = "again", "network", "training once more", ("the network", "trained again")
+OWN = "again", "training once more"
 
 
 @dataclass(frozen=True)

@@ -16,20 +16,20 @@ from ..checkpoint import Checkpoints
 from ..config import Config, scaled_steps
 from ..cube.cutting import subdivide_finely
 from ..layouts.rods.along_skeleton import Block, BlockLayout, LayoutError, block_layout
-from ..layouts.skeleton.graph import Branch, Skeleton, SkeletonError
+from ..layouts.skeleton.graph import Skeleton, SkeletonError
 from ..optimization.phases import Polish, Schedule, Separate, Unfold
 from ..optimization.reassignment import reassign
 from ..optimization.sliding import SlidingParameters
-from ..optimization.surface_distance import TANGENTIAL, Correspondence
+from ..optimization.surface_distance import Correspondence
 from ..optimization.term import Weights
 from ..progress import timed
 from ..spline.bspline import greville, open_uniform_knots
 from ..spline.control_nets import ControlNets
 from ..spline.spline_map import SplineMap
-from ..surface.geometry import normals_and_areas, vertex_quadrics, vertex_weights
+from ..surface.geometry import normals_and_areas
 from ..threads import one_blas_thread
 from .growth import GROWTH, STEPS, Grow
-from .laid import kept_blocks
+from .laid import in_words, kept_blocks
 from .one_cube import MORE_ROUNDS
 from .task import MOST_POINTS, MappingTask
 from .way import Attempt, Suits, Way, optimized
@@ -62,6 +62,9 @@ class Approach(Grow):
 
 class AlongSkeleton(Way):
     """Make a map of several blocks along the branches of the solid's skeleton."""
+
+    origin = "blocks"
+    comes_from = "blocks along the skeleton", "glued by whole faces, and drawn to the surface"
 
     def suits(self, task: MappingTask) -> Suits:
         """Return whether the body has handles, or is nearly all limbs that are long, or the options ask for blocks."""
@@ -105,19 +108,15 @@ class AlongSkeleton(Way):
         return super().serves(attempt) and both_ways <= GROWTH.far
 
 
-BLOCKS = AlongSkeleton(
-    "blocks",
-    "blocks",
-    "laying blocks along the skeleton",
-    ("blocks along the skeleton", "glued by whole faces, and drawn to the surface"),
-)
+BLOCKS = AlongSkeleton("blocks", "laying blocks along the skeleton")
 
 
 def of_limbs(skeleton: Skeleton) -> Suits:
     """Return whether a body without handles is nearly all long limbs, by its skeleton."""
     if max(skeleton.degrees) < 3:
         return Suits(False, "no handles, and no place where limbs meet: one cube")
-    slender = max(_slenderness(branch) for branch in skeleton.branches if _is_limb(branch, skeleton))
+    limbs = [branch for branch in skeleton.branches if min(skeleton.degrees[end] for end in branch.ends) == 1]
+    slender = max(branch.length / float(np.median(branch.radii)) for branch in limbs)
     figures = f"{skeleton.tube:.2f} of the volume around its curves, longest limb {slender:.1f} radii"
     if skeleton.tube < TUBE_OF_LIMBS:
         return Suits(False, f"no handles, and a fat trunk: {figures}: one cube")
@@ -130,23 +129,8 @@ def _of_handles(skeleton: Skeleton) -> str:
     """Return why blocks along the branches suit a body with handles."""
     figures = f"{skeleton.tube:.2f} of the volume around its curves"
     if skeleton.tube >= TUBE_OF_HANDLES:
-        return f"{handles_in_words(skeleton)}, thick branches: {figures}: blocks along them"
-    return f"{handles_in_words(skeleton)}, flat branches: {figures}: blocks as wide as the body along them"
-
-
-def handles_in_words(skeleton: Skeleton) -> str:
-    """Return the number of handles in words."""
-    return "1 handle" if skeleton.handles == 1 else f"{skeleton.handles} handles"
-
-
-def _is_limb(branch: Branch, skeleton: Skeleton) -> bool:
-    """Return whether a branch ends in a tip."""
-    return min(skeleton.degrees[end] for end in branch.ends) == 1
-
-
-def _slenderness(branch: Branch) -> float:
-    """Return the length of a branch over its median radius."""
-    return branch.length / float(np.median(branch.radii))
+        return f"{in_words(skeleton.handles, 'handle')}, thick branches: {figures}: blocks along them"
+    return f"{in_words(skeleton.handles, 'handle')}, flat branches: {figures}: blocks as wide as the body along them"
 
 
 def _compactness(task: MappingTask) -> float:
@@ -219,13 +203,8 @@ def surface_fit(task: MappingTask, first: SplineMap) -> Correspondence:
     surface = task.surface
     points, faces = subdivide_finely(surface.unit_vertices, surface.faces, _LONGEST, task.own + MOST_POINTS)
     face = int(np.flatnonzero(first.nets.exposed)[0])  # any: places are assigned at once
-    places = np.full((len(points), 3), 0.5)
-    places[:, face % 6 // 2] = face % 2
-    fit = Correspondence(
-        SlidingParameters(first.nets, places, np.full(len(points), face), faces),
-        points,
-        vertex_quadrics(points, faces, TANGENTIAL),
-        vertex_weights(points, faces, task.own),
-    )
+    parameters = np.full((len(points), 3), 0.5)
+    parameters[:, face % 6 // 2] = face % 2
+    fit = task.correspondence(SlidingParameters(first.nets, parameters, np.full(len(points), face), faces), points)
     reassign(fit, first.control, first=True)
     return fit

@@ -8,7 +8,6 @@ Panozzo, Sorkine-Hornung, SGP 2013).
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import ClassVar
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -62,7 +61,9 @@ class Growth(OneCube):
     its `far`, certified or not.
     """
 
-    counted: ClassVar[bool] = True
+    origin = "growth"
+    comes_from = "a growing cube", "the surface laid on its faces without the network"
+    counted = True
     turn: int = 0
     far: float = 0.005
     patience: int = 6
@@ -106,21 +107,18 @@ class Growth(OneCube):
         return Schedule(phases, grown + config.spline.rounds + MORE_ROUNDS)
 
 
-_COMES_FROM = "a growing cube", "the surface laid on its faces without the network"
-GROWTH = Growth("growth", "growth", "growing a map from a cube", _COMES_FROM)
+GROWTH = Growth("growth", "growing a map from a cube")
 # Where the first growth fails: far thinner parts keep their small det J, and squeezed parts do not buckle.
 # Of 59 hard surfaces 15 needed this growth and one the last; a fit to an extended layout between served none.
 STIFF = Growth(
     "stiff growth",
-    "growth",
     "growing a stiffer map",
-    _COMES_FROM,
     turn=1,
     far=0.01,
     patience=12,
     stiffness=10.0,
     least_floor=0.05,
-    beside=GROWTH.name,
+    beside="growth",
 )
 # Where all else fails: a certified map that is far from the surface is worth more than none.
 LAST = replace(

@@ -14,7 +14,7 @@ from ..cube.boundary_map import on_faces
 from ..optimization.certified_map import CertifiedMap
 from ..optimization.endings import Course, Reason
 from ..optimization.sliding import SlidingParameters
-from ..optimization.surface_distance import TANGENTIAL, Correspondence
+from ..optimization.surface_distance import Correspondence
 from ..optimization.term import Weights
 from ..progress import timed
 from ..quality.distances import nearest_on_boundary
@@ -23,7 +23,6 @@ from ..spline.interface import Interface
 from ..spline.sampled_boundary import SampledBoundary
 from ..spline.spline_map import SplineMap
 from ..spline.volume import FACE_NAMES
-from ..surface.geometry import vertex_quadrics, vertex_weights
 from ..threads import one_blas_thread
 from .cost import Cost
 from .task import MappingTask
@@ -55,13 +54,14 @@ class Laid(Way):
         return True
 
     def cost(self, task: MappingTask) -> Cost:
-        """Return the cost of the certificate."""
-        return Cost.of_certificate(float(len(self.lay(task).control[0])), task.config)
+        """Return the cost of the certificate of the blocks, which the checkpoint keeps."""
+        first = kept_blocks(task.checkpoints, lambda: self.lay(task))
+        return Cost.of_certificate(first.control.shape[1], task.config)
 
 
-def in_words(count: int, kind: str = "") -> str:
-    """Return a number of blocks in words."""
-    return f"{count} {kind}block{'s' * (count > 1)}"
+def in_words(count: int, noun: str) -> str:
+    """Return a number of things in words."""
+    return f"{count} {noun}{'s' * (count > 1)}"
 
 
 def _surface_fit(task: MappingTask, first: SplineMap) -> Correspondence:
@@ -71,12 +71,7 @@ def _surface_fit(task: MappingTask, first: SplineMap) -> Correspondence:
     patches, parameters, _ = nearest_on_boundary(points, body, SampledBoundary.of(body))
     outer = np.array([[name in names for name in FACE_NAMES] for names in body.outer])
     owners = 6 * patches + np.argmax(on_faces(parameters) & outer[patches], axis=1)
-    return Correspondence(
-        SlidingParameters(first.nets, parameters, owners, faces),
-        points,
-        vertex_quadrics(points, faces, TANGENTIAL),
-        vertex_weights(points, faces, task.own),
-    )
+    return task.correspondence(SlidingParameters(first.nets, parameters, owners, faces), points)
 
 
 def kept_blocks(checkpoints: Checkpoints, lay: Callable[[], SplineMap]) -> SplineMap:

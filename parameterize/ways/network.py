@@ -29,7 +29,8 @@ _FEW_FLIPS = 1e-2  # with a larger share of flipped triangles the surface is cut
 class Network(OneCube):
     """Make a map from a trained network, which maps the solid into the cube."""
 
-    counted = True
+    origin, counted = "network", True
+    comes_from = "the network", "trained on the surface"
 
     def make(self, task: MappingTask, checkpoints: Checkpoints) -> Attempt | None:
         """Train the network, fit F to it and return the optimised F as an attempt.
@@ -78,7 +79,7 @@ class Network(OneCube):
         return replace(cube, passes=(cube.passes[0] + low, cube.passes[1] + high), memory_mb=activations)
 
 
-NETWORK = Network("network", "network", "training the network", ("the network", "trained on the surface"))
+NETWORK = Network("network", "training the network")
 
 
 def _has_others(task: MappingTask) -> bool:

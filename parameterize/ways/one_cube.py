@@ -15,10 +15,9 @@ from ..cube.sphere import lay_on_sphere
 from ..cube.turning import best_turn
 from ..optimization.least_squares import fit_pairs
 from ..optimization.sliding import SlidingParameters
-from ..optimization.surface_distance import TANGENTIAL, Correspondence
+from ..optimization.surface_distance import Correspondence
 from ..spline.control_nets import ControlNets
 from ..spline.spline_map import SplineMap
-from ..surface.geometry import vertex_quadrics, vertex_weights
 from .task import MOST_POINTS, MappingTask
 from .way import Suits, Way
 
@@ -67,13 +66,7 @@ def correspondence(
     spline = task.config.spline
     nets = ControlNets(spline.degree, (coarse_knots(spline, coarse),))
     faces, fixed = (None, None) if kept is None else (kept.faces, kept.fixed)
-    return Correspondence(
-        SlidingParameters(nets, layout.places, faces, layout.faces, fixed),
-        layout.points,
-        vertex_quadrics(layout.points, layout.faces, TANGENTIAL),
-        vertex_weights(layout.points, layout.faces, layout.n_own),
-        given_corners=None if task.given_corners is None else task.mesh[0][task.given_corners],
-    )
+    return task.correspondence(SlidingParameters(nets, layout.places, faces, layout.faces, fixed), layout.points)
 
 
 def first_spline(inside: Array, places: Array, fit: Correspondence) -> SplineMap:

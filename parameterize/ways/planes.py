@@ -19,12 +19,17 @@ from .way import Suits
 class BoundedByPlanes(Laid):
     """Make a map of exact blocks, which are found with their proof."""
 
-    why = Reason.EXACT
+    origin, why = "planes", Reason.EXACT
+    comes_from = "exact blocks", "along the planes of the surface"
 
     def suits(self, task: MappingTask) -> Suits:
         """Return whether planes bound the body, and divide it into few enough hexahedra."""
         layout = _exact_blocks(task)
-        return Suits(False) if layout is None else Suits(True, f"bounded by planes: {in_words(len(layout), 'exact ')}")
+        return (
+            Suits(False)
+            if layout is None
+            else Suits(True, f"bounded by planes: {in_words(len(layout), 'exact block')}")
+        )
 
     def lay(self, task: MappingTask) -> SplineMap:
         """Return the map of exact blocks at volume 1."""
@@ -33,9 +38,7 @@ class BoundedByPlanes(Laid):
         return thin_blocks(layout, task.config.spline.degree)
 
 
-PLANES = BoundedByPlanes(
-    "planes", "planes", "laying exact blocks along the planes", ("exact blocks", "along the planes of the surface")
-)
+PLANES = BoundedByPlanes("planes", "laying exact blocks along the planes")
 
 
 def _exact_blocks(task: MappingTask) -> BlockLayout | None:

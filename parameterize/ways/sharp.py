@@ -39,6 +39,9 @@ _TURNS = 3  # of the cube that are tried, until twelve paths are found: corners 
 class Sharp(OneCube):
     """Make a map by a harmonic extension of a layout whose cube has its edges on sharp edges of the surface."""
 
+    origin = "sharp"
+    comes_from = "the surface's layout on a cube", "extended into the solid without the network"
+
     def suits(self, task: MappingTask) -> Suits:
         """Return whether sharp edges are long, and nearly all are ridges."""
         return Suits(task.config.starts > 1 and super().suits(task).applies and ridges_of(task) is not None)
@@ -71,12 +74,7 @@ def schedule(spline: SplineConfig) -> Schedule:
     return Schedule((Shape(), Unfold(), Separate(), Polish()), spline.rounds + MORE_ROUNDS)
 
 
-SHARP = Sharp(
-    "sharp edges",
-    "sharp",
-    "laying the cube's edges along sharp edges",
-    ("the surface's layout on a cube", "extended into the solid without the network"),
-)
+SHARP = Sharp("sharp edges", "laying the cube's edges along sharp edges")
 
 
 def ridges_of(task: MappingTask) -> Ridges | None:

@@ -11,7 +11,8 @@ from .way import Suits
 class StackOfExtrusions(Laid):
     """Make a map of blocks over the profiles, which are found with their proof."""
 
-    why = Reason.LAID
+    origin, why = "stacks", Reason.LAID
+    comes_from = "blocks", "along the outlines of extrusions"
 
     def suits(self, task: MappingTask) -> Suits:
         """Return whether the body is a stack of extrusions, and its profiles are divided into few enough blocks."""
@@ -19,7 +20,7 @@ class StackOfExtrusions(Laid):
         if blocks is None:
             return Suits(False)
         off = f"within {blocks.off:.1e} of its outlines (over diagonal)"
-        return Suits(True, f"a stack of extrusions: {in_words(len(blocks))}, {off}")
+        return Suits(True, f"a stack of extrusions: {in_words(len(blocks), 'block')}, {off}")
 
     def lay(self, task: MappingTask) -> SplineMap:
         """Return the map of the stacked blocks at volume 1."""
@@ -28,9 +29,7 @@ class StackOfExtrusions(Laid):
         return blocks.spline
 
 
-STACKS = StackOfExtrusions(
-    "stacks", "stacks", "laying blocks along the outlines of extrusions", ("blocks", "along the outlines of extrusions")
-)
+STACKS = StackOfExtrusions("stacks", "laying blocks along the outlines of extrusions")
 
 
 def _stacked_blocks(task: MappingTask) -> Columns | None:

@@ -28,18 +28,9 @@ from ..surface.errors import MeshError
 from ..surface.solid import Solid
 from ..surface.surface import surface_from_arrays
 from ..threads import one_blas_thread
-from .blocks import (
-    BLOCKS,
-    STIFF_WEIGHTS,
-    TUBE_OF_HANDLES,
-    handles_in_words,
-    nets_of,
-    points_of,
-    schedule,
-    softened,
-    surface_fit,
-)
+from .blocks import BLOCKS, STIFF_WEIGHTS, TUBE_OF_HANDLES, nets_of, points_of, schedule, softened, surface_fit
 from .growth import GROWTH
+from .laid import in_words
 from .task import MOST_POINTS, MappingTask
 from .way import Attempt, Suits, Way, optimized
 
@@ -55,12 +46,14 @@ _A_SPAN = 4  # samples of the body's faces among which rims find their places
 class WithStubs(Way):
     """Make a map of a body as one cube, cut into blocks, and of its handles as rods on their faces."""
 
+    origin, comes_from = BLOCKS.origin, BLOCKS.comes_from
+
     def suits(self, task: MappingTask) -> Suits:
         """Return whether the body is fat, and all its handles are thin tubes that leave it and come back to it."""
         if not task.surface.genus or task.skeleton.tube >= TUBE_OF_HANDLES or not _handles(task):
             return Suits(False)
         figures = f"{task.skeleton.tube:.2f} of the volume around its curves"
-        handles = f"{handles_in_words(task.skeleton)}, thin ones on a fat body"
+        handles = f"{in_words(task.skeleton.handles, 'handle')}, thin ones on a fat body"
         return Suits(True, f"{handles}: {figures}: one block, with the handles on its faces")
 
     def make(self, task: MappingTask, checkpoints: Checkpoints) -> Attempt | None:
@@ -89,12 +82,7 @@ class WithStubs(Way):
         return replace(made, course=made.course.after(earlier))
 
 
-STUBS = WithStubs(
-    "body with stubs",
-    "blocks",
-    "mapping the body without its handles, and laying rods for these,",
-    BLOCKS.comes_from,
-)
+STUBS = WithStubs("body with stubs", "mapping the body without its handles, and laying rods for these,")
 
 
 def _handles(task: MappingTask) -> tuple[Handle, ...]:

@@ -13,6 +13,9 @@ from ..cube.cutting import subdivide_finely
 from ..layouts.rods.along_skeleton import SPANS
 from ..layouts.skeleton.graph import Skeleton, SkeletonError
 from ..layouts.skeleton.solid import skeleton_of
+from ..optimization.sliding import SlidingParameters
+from ..optimization.surface_distance import TANGENTIAL, Correspondence
+from ..surface.geometry import vertex_quadrics, vertex_weights
 from ..surface.surface import Surface
 
 FEWEST_SPANS = 4  # across a block: with fewer its section cannot become round
@@ -77,6 +80,16 @@ class MappingTask:
     def in_users_units(self, point: Array) -> str:
         """Return a point (3,) at volume 1 in words, in the user's units."""
         return in_brackets(self.surface.from_unit(point))
+
+    def correspondence(self, parameters: SlidingParameters, points: Array) -> Correspondence:
+        """Return surface points (n, 3) with their parameters; the surface's own vertices are first."""
+        return Correspondence(
+            parameters,
+            points,
+            vertex_quadrics(points, parameters.triangles, TANGENTIAL),
+            vertex_weights(points, parameters.triangles, self.own),
+            given_corners=None if self.given_corners is None else self.mesh[0][self.given_corners],
+        )
 
     def fact(self, key: object, find: Callable[[], Fact]) -> Fact:
         """Return what `find` finds on the surface, once for a key: the forecast of a run asks before the run does."""

@@ -78,14 +78,15 @@ class Suits:
 class Way(ABC):
     """Describe a way to a map; docs/ways.md says which body takes which.
 
-    name: the name in report.json, and, with "-" for spaces, on the command line. origin: the kind of way. doing: the
-    way in words, as the log shows it. comes_from: the same for report.html, the map's source and how it is made.
+    name: the name in report.json, and, with "-" for spaces, on the command line. doing: the way in words, as the log
+    shows it. origin: the kind of way. comes_from: the kind in words for report.html, the map's source and how it is
+    made.
     """
 
     name: str
-    origin: str
     doing: str
-    comes_from: tuple[str, str]
+    origin: ClassVar[str]
+    comes_from: ClassVar[tuple[str, str]]
     counted: ClassVar[bool] = False  # among the tries that `Config.starts` limits
 
     @abstractmethod

@@ -84,7 +84,7 @@ def killed_after(name, count):
 
     def saved(self, own, *given):
         save(self, own, *given)
-        left[0] -= own + self._suffix == name
+        left[0] -= self._folder is not None and own + self._suffix == name
         if left[0] == 0:
             os.kill(os.getpid(), signal.SIGKILL)
 
