@@ -133,12 +133,6 @@ def octant_label(octant: Octant) -> str:
     return ", ".join(f"{axis} {'<>'[side]} 1/2" for axis, side in zip(AXES, octant, strict=True))
 
 
-def _sides(axis: int, octant: Octant) -> tuple[int, int]:
-    """Return the octant's sides in the two directions of a patch normal to an axis."""
-    first, second = (side for a, side in enumerate(octant) if a != axis)
-    return first, second
-
-
 def _half(samples: int, side: int) -> slice:
     middle = samples // 2
     return slice(middle, None) if side else slice(middle + 1)
@@ -154,7 +148,7 @@ def _outside(faces: Sequence[Array], octant: Octant) -> Array:
     total = np.zeros(3)
     for axis, side in enumerate(octant):
         points = faces[2 * axis + side]
-        first, second = _sides(axis, octant)
+        first, second = (end for a, end in enumerate(octant) if a != axis)
         quarter = points[_half(len(points), first), _half(len(points), second)]
         diagonals = quarter[1:, 1:] - quarter[:-1, :-1], quarter[:-1, 1:] - quarter[1:, :-1]
         area = 0.5 * np.cross(*diagonals).sum(axis=(0, 1))

@@ -3,7 +3,6 @@
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict
 from functools import singledispatch
-from html import escape
 from typing import Any
 
 from parameterize.arrays import Array, in_brackets
@@ -20,6 +19,7 @@ from solve.study import Convergence
 
 from ..level_table import as_rows
 from . import document as reports
+from .html import filled
 
 
 @singledispatch
@@ -73,7 +73,7 @@ def _certificate(certificate: Certificate) -> str:
     facts = [("volume", f"{certificate.volume:.6g}")]
     if certificate.verdict == "certified":
         facts.append(("|det J| is at least", f"{certificate.lower_bound:.3g} of its mean"))
-    return _table(f"{len(certificate.patches)} patches: {certificate.verdict}", facts) + _list(certificate.defects)
+    return _table(f"{len(certificate.patches)} patches: {certificate.verdict}", facts, notices=certificate.defects)
 
 
 def _of_patch(certificate: PatchCertificate) -> str:
@@ -124,7 +124,7 @@ def _solution(solution: Solution) -> str:
     report = solution.report
     head, *rows = as_rows([report.as_dict()])
     title = "Solution" if report.converged else f"Solution, NOT CONVERGED (residual {report.residual:.1e})"
-    return _table(title, rows, head) + _list(report.notices)
+    return _table(title, rows, head, notices=report.notices)
 
 
 @as_html.register
@@ -132,7 +132,7 @@ def _study(study: Convergence) -> str:
     levels = [row.report.as_dict() | {"rate_l2": row.rate_l2, "rate_h1": row.rate_h1} for row in study]
     head, *rows = as_rows(levels) or [[]]
     notices = dict.fromkeys(line for row in study for line in row.report.notices)
-    return _table("Convergence", rows, head) + _list(notices)
+    return _table("Convergence", rows, head, notices=notices)
 
 
 def _both(measure: BothScales[Any]) -> list[str]:
@@ -147,14 +147,6 @@ def _ends(low: Array, high: Array) -> str:
     return f"{in_brackets(low)} to {in_brackets(high)}"
 
 
-def _table(title: str, rows: Iterable[Sequence[str]], head: Sequence[str] = ()) -> str:
-    lines = [f"<table><caption>{escape(title)}</caption>"]
-    if head:
-        lines.append("<tr>" + "".join(f"<th>{escape(text)}</th>" for text in head) + "</tr>")
-    lines += ["<tr>" + "".join(f"<td>{escape(text)}</td>" for text in row) + "</tr>" for row in rows]
-    return "\n".join([*lines, "</table>"])
-
-
-def _list(texts: Iterable[str]) -> str:
-    items = "".join(f"<li>{escape(text)}</li>" for text in texts)
-    return f"<ul>{items}</ul>" if items else ""
+def _table(title: str, rows: Iterable[Sequence[str]], head: Sequence[str] = (), *, notices: Iterable[str] = ()) -> str:
+    """Return a table as HTML, with a list of notices below."""
+    return filled("report/notebook.html", title=title, rows=rows, head=head, notices=list(notices))

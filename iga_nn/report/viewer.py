@@ -119,13 +119,12 @@ def scene_of_frames(
     frames: Sequence[Frame],
     *,
     oscillates: bool = False,
-    coarser: int = 2,
 ) -> Scene:
     """Return the scene of several frames, which the page plays one after another; a field has one range in all of them.
 
     Vectors of three components displace the body, by a factor that shows the largest well. oscillates: for modes, a
-    frame swings between its displacements and their opposite. coarser: as in `scene_of`; with 2 a frame takes some
-    40 kB a field, and 120 kB its displacements.
+    frame swings between its displacements and their opposite. Every second point is taken: a frame takes some 40 kB a
+    field, and 120 kB its displacements.
     Raises ValueError for no frames, and for frames of different fields.
 
     Examples
@@ -152,7 +151,7 @@ def scene_of_frames(
     moved = [frame.vectors for frame in alike if frame.displaces and frame.vectors is not None]
     lengths = [np.linalg.norm(values, axis=-1).max() for vectors in moved for values in vectors.everywhere]
     factor = factor_for(points_of(body).diagonal, float(max(lengths, default=0.0)))
-    return _scene(body, alike, coarser) | {"warp": factor, "oscillates": oscillates}
+    return _scene(body, alike, coarser=2) | {"warp": factor, "oscillates": oscillates}
 
 
 @dataclass(frozen=True)
