@@ -34,7 +34,7 @@ class NetworkConfig:
 
 @dataclass(frozen=True)
 class StageConfig:
-    """A training stage, by its name in `training/stages.py`, and its number of steps."""
+    """A training stage, by its name in `training/losses.py`, and its number of steps."""
 
     name: StageName
     steps: int

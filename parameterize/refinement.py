@@ -26,12 +26,11 @@ from .optimization.spans import in_blocks
 from .optimization.surface_distance import Correspondence
 from .optimization.term import Weights
 from .progress import History, ProgressCallback
+from .quality.distances import two_sided
 from .quality.distortion import arap_grid, own_boxes
-from .quality.two_sided import two_sided
 from .spline.body import shared_numbers
 from .spline.bspline import breakpoints, midpoints
-from .spline.control_nets import ControlNets
-from .spline.directions import tied_spans
+from .spline.control_nets import ControlNets, tied_spans
 from .spline.spline_map import SplineMap
 from .spline.volume import AXES
 

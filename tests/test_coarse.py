@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from parameterize.coarse import coarse_knots
 from parameterize.config import preset
+from parameterize.optimization.rounds import coarse_knots
 from parameterize.spline.bspline import open_uniform_knots
 
 FAST = preset("fast")

@@ -8,7 +8,7 @@ import pytest
 import iga_nn
 import parameterize
 from parameterize.config import PRESETS, preset
-from parameterize.training.stages import STAGES
+from parameterize.training.losses import STAGES
 
 
 @pytest.mark.parametrize("name", sorted(PRESETS))

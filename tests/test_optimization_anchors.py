@@ -45,7 +45,7 @@ def test_edge_points_are_the_corners_and_two_a_span():
 def test_anchors_measure_how_far_the_edges_are_from_the_surface():
     anchors, control = anchors_on_a_ball(), unit_cube()
     anchors.aim(control)
-    energy, _ = anchors.fit.energy_and_gradient(control)
+    energy, _ = anchors.energy_and_gradient(control)
     # F is the identity, the surface a ball of radius 1/2: nearly all of the distance is along the ball's normal
     distance = np.linalg.norm(edge_points(NETS)[0] - 0.5, axis=1) - 0.5
     assert energy == pytest.approx((distance**2).mean(), rel=0.02)
@@ -54,8 +54,8 @@ def test_anchors_measure_how_far_the_edges_are_from_the_surface():
 def test_what_they_pull_on_comes_closer():
     anchors, control = anchors_on_a_ball(), unit_cube()
     anchors.aim(control)
-    before, gradient = anchors.fit.energy_and_gradient(control)
-    after, _ = anchors.fit.energy_and_gradient(control - gradient)
+    before, gradient = anchors.energy_and_gradient(control)
+    after, _ = anchors.energy_and_gradient(control - gradient)
     assert after < before
     # downhill leads towards the centre, at all eight corners
     inward = NETS.of_block((gradient * (control - 0.5)).sum(0), 0)
@@ -66,7 +66,7 @@ def test_released_they_pull_on_nothing():
     anchors, control = anchors_on_a_ball(), unit_cube()
     anchors.aim(control)
     anchors.release()
-    energy, gradient = anchors.fit.energy_and_gradient(control)
+    energy, gradient = anchors.energy_and_gradient(control)
     assert energy == 0.0
     assert not gradient.any()
 
@@ -75,7 +75,7 @@ def test_given_corners_are_held_while_nothing_else_is():
     wanted = CORNERS + 0.01 * np.arange(24).reshape(8, 3)
     anchors, control = anchors_on_a_ball(given_corners=wanted), unit_cube()
     anchors.release()
-    _, gradient = anchors.fit.energy_and_gradient(control)
+    _, gradient = anchors.energy_and_gradient(control)
     downhill = -NETS.of_block(gradient, 0)[:, [0, -1]][:, :, [0, -1]][:, :, :, [0, -1]].reshape(3, 8).T
     np.testing.assert_allclose(downhill / np.abs(downhill).max(), (wanted - CORNERS) / 0.23, atol=1e-12)
 

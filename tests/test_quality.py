@@ -14,10 +14,9 @@ from shapes import CORNERS, CUBE_FACES
 from parameterize.certificate.body import certify
 from parameterize.certificate.boundary import check_boundary
 from parameterize.cube.boundary_map import BoundaryMap
-from parameterize.quality.distances import Distances, nearest_on_boundary
+from parameterize.quality.distances import Distances, nearest_on_boundary, two_sided
 from parameterize.quality.distortion import arap_grid
 from parameterize.quality.quality import measure
-from parameterize.quality.two_sided import two_sided
 from parameterize.spline.body import Body
 from parameterize.spline.bspline import collocation, greville, open_uniform_knots
 from parameterize.spline.sampled_boundary import SampledBoundary

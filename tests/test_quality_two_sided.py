@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 from shapes import CORNERS, CUBE_FACES
 
-from parameterize.quality import two_sided as module
-from parameterize.quality.two_sided import two_sided
+from parameterize.quality import distances as module
+from parameterize.quality.distances import two_sided
 from parameterize.spline.volume import BSplineVolume
 
 HEIGHT = 0.01

@@ -17,7 +17,7 @@ from parameterize.optimization.sliding import SlidingParameters
 from parameterize.optimization.surface_distance import TANGENTIAL, Correspondence
 from parameterize.optimization.term import Weights
 from parameterize.progress import History, ignore
-from parameterize.quality.two_sided import two_sided
+from parameterize.quality.distances import two_sided
 from parameterize.refinement import refine
 from parameterize.spline.bspline import greville, open_uniform_knots
 from parameterize.spline.control_nets import ControlNets

@@ -16,7 +16,7 @@ from parameterize.optimization.phases import Polish, Schedule, Separate, Shape, 
 from parameterize.optimization.rounds import optimize
 from parameterize.optimization.term import Weights
 from parameterize.progress import History, ignore
-from parameterize.quality.two_sided import two_sided
+from parameterize.quality.distances import two_sided
 from parameterize.refinement import refine
 from parameterize.run import parameterize
 from parameterize.spline.body import Body, shared_numbers

@@ -3,7 +3,7 @@
 import numpy as np
 from block_bodies import uniform_nets
 
-from parameterize.spline.directions import tied_spans
+from parameterize.spline.control_nets import tied_spans
 from parameterize.spline.interface import Interface
 
 

@@ -10,8 +10,7 @@ from parameterize.certificate.body import certify
 from parameterize.layouts.stacks.stack import stack_of
 from parameterize.layouts.stacks.stacked_blocks import columns_of
 from parameterize.layouts.stacks.tapers import tapered_stack_of
-from parameterize.quality.distances import nearest_on_boundary
-from parameterize.quality.two_sided import two_sided
+from parameterize.quality.distances import nearest_on_boundary, two_sided
 from parameterize.spline.sampled_boundary import SampledBoundary
 from parameterize.surface.geometry import signed_volume
 

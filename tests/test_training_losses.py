@@ -3,7 +3,7 @@ import pytest
 import torch
 
 from parameterize.training import losses
-from parameterize.training.matrices import determinant
+from parameterize.training.losses import determinant
 from parameterize.training.samples import OFFSETS
 
 CELL = 0.1

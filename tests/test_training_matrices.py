@@ -3,7 +3,7 @@ import pytest
 import torch
 
 from parameterize.quality.rotations import closest_rotations
-from parameterize.training.matrices import closest_rotation, cofactor, determinant
+from parameterize.training.losses import closest_rotation, cofactor, determinant
 
 
 def test_determinants_cofactors_and_rotations_of_tensors():

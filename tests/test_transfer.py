@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from small_run import small_surface, tiny_config
 
-from parameterize.quality.two_sided import two_sided
+from parameterize.quality.distances import two_sided
 from parameterize.run import corner_vertices, parameterize
 from parameterize.surface import decimation
 from parameterize.surface.surface import surface_from_arrays

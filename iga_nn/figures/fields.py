@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from parameterize.arrays import Array
-from parameterize.quality.distortion import arap_in_box, arap_on, own_box
+from parameterize.quality.distortion import arap_on, own_boxes
 from parameterize.spline.body import BodyLike, as_body
 from parameterize.spline.volume import AXES, FACE_NAMES, BSplineVolume
 from solve.field import FieldOnBody, Points, SplineField
@@ -172,9 +172,8 @@ def arap_of(body: BodyLike) -> list[OnGrid]:
     A volume is measured at volume 1, each of several patches against its own box.
     """
     glued = as_body(body)
-    if not glued.is_single:
-        return [partial(arap_in_box, patch, box=own_box(patch)) for patch in glued]
-    return [partial(arap_on, glued.only, scale=1.0 / UnitFrame.of(glued).length)]
+    boxes = [UnitFrame.of(glued).length] if glued.is_single else own_boxes(glued)
+    return [partial(arap_on, patch, box=box) for patch, box in zip(glued, boxes, strict=True)]
 
 
 @remembered

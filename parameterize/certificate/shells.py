@@ -8,14 +8,13 @@ one part is one-to-one, exactly one shell faces outward.
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from ..arrays import Array, IntArray, Mask
 from ..spline.body import Body, shared_numbers
 from ..spline.interface import axis_side, face_layer
 from ..spline.orientation import exact_rules, face_flux, orientation
 from ..spline.volume import BSplineVolume
+from ..surface.geometry import connected
 
 _ROUNDING = 1e-9  # of the sum of their magnitudes: more than the integrals over faces can be off
 
@@ -56,9 +55,7 @@ def _shells(body: Body) -> list[list[BoundaryFace]]:
 
 def _groups(count: int, pairs: Sequence[tuple[int, int]]) -> IntArray:
     """Return the number (count,) of the connected group of each node of a graph, 0 to the number of groups - 1."""
-    i, j = np.array(pairs, dtype=np.int64).reshape(-1, 2).T
-    graph = coo_array((np.ones(len(i), dtype=np.int8), (i, j)), shape=(count, count))
-    return np.asarray(connected_components(graph, directed=False)[1], dtype=np.int64)
+    return connected(np.array(pairs, dtype=np.int64).reshape(-1, 2), count)
 
 
 def _outward(body: Body, shells: Sequence[Sequence[BoundaryFace]], alone: Mask) -> Mask | None:

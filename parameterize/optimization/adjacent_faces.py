@@ -10,7 +10,7 @@ import numpy as np
 
 from ..arrays import Array, IntArray
 from ..spline.control_nets import ControlNets
-from ..spline.interface import Interface, axis_side, varying
+from ..spline.interface import Interface, axis_side
 
 Edges = tuple[IntArray, Array]  # the table of `next_faces`, and the side lengths (blocks, 3) of the blocks
 
@@ -62,11 +62,10 @@ def _crossings(interface: Interface) -> dict[tuple[int, int, int], tuple[int, in
     (p, name), (q, other_name) = interface.first, interface.second
     (axis, end), (other_axis, other_end) = axis_side(name), axis_side(other_name)
     first, second = 6 * p + 2 * axis + end, 6 * q + 2 * other_axis + other_end
-    others = varying(other_name)[::-1] if interface.swapped else varying(other_name)
-    for k, (direction, partner) in enumerate(zip(varying(name), others, strict=True)):
+    for k, (direction, partner, flip) in enumerate(interface.directions):
         turned = int(interface.flipped[1 - k])
         for side in range(2):
-            across = side ^ int(interface.flipped[k])
+            across = side ^ int(flip)
             found[first, direction, side] = second, partner, across, turned
             found[second, partner, across] = first, direction, side, turned
     return found

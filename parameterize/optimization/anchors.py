@@ -22,7 +22,6 @@ from ..cube.cube import CORNERS, EDGES, face_number
 from ..spline.bspline import divided_spans
 from ..spline.control_nets import ControlNets
 from ..surface.nearest import nearest_on_mesh
-from .operators import PiecewiseOperator
 from .sliding import SlidingParameters
 from .surface_distance import TANGENTIAL, Correspondence
 from .term import RoundWeights
@@ -71,54 +70,36 @@ def face_points(nets: ControlNets) -> tuple[Array, IntArray]:
     return np.concatenate(points), np.concatenate(faces)
 
 
-def _anchor_points(nets: ControlNets) -> tuple[Array, IntArray]:
-    """Return the points of the anchors (k, 3), and their faces (k,)."""
-    if nets.is_single:
-        return edge_points(nets)
-    points, faces = zip(edge_points(nets), face_points(nets), strict=True)
-    return np.concatenate(points), np.concatenate(faces)
-
-
-class Anchors:
-    """Hold the anchors as a Correspondence with fixed parameters; anchors have no effect until `aim` is called."""
+class Anchors(Correspondence):
+    """Hold the anchors as points with fixed parameters; anchors have no effect until `aim` is called."""
 
     def __init__(self, surface: Correspondence) -> None:
-        self._surface = surface
         nets = surface.places.nets
-        self._share = _EDGES if nets.is_single else _FACES
-        points, faces = _anchor_points(nets)
-        places = SlidingParameters(nets, points, faces)
-        self.fit = Correspondence(
-            places, points, np.zeros((len(points), 3, 3)), np.full(len(points), 1.0 / len(points))
-        )
+        kinds = (edge_points,) if nets.is_single else (edge_points, face_points)
+        points, faces = map(np.concatenate, zip(*(of(nets) for of in kinds), strict=True))
+        self._surface, self._share = surface, _EDGES if nets.is_single else _FACES
+        shares = np.full(len(points), 1.0 / len(points))
+        super().__init__(SlidingParameters(nets, points, faces), points, np.zeros((len(points), 3, 3)), shares)
 
     def weight(self, weights: RoundWeights) -> float:
         """Return the weight of the anchors in a round, a share of the weight of the surface's data."""
         return self._share * weights.surface
 
-    def energy_and_gradient(self, control: Array) -> tuple[float, Array]:
-        """Return the mean squared distance at control points (3, n), and its gradient of the same shape."""
-        return self.fit.energy_and_gradient(control)
-
-    def curvature(self, control: Array) -> PiecewiseOperator:
-        """Return the second derivative as an operator in single precision."""
-        return self.fit.curvature(control)
-
     def aim(self, control: Array) -> None:
         """Set as goals the points of the surface that are nearest to F, with the normals of their triangles."""
-        here = self.fit.residuals(control) + self.fit.points
+        here = self.residuals(control) + self.points
         points, normals = nearest_on_mesh(here, self._surface.points, self._surface.places.triangles)
-        self.fit.aim(points, normals[:, :, None] * normals[:, None, :] + TANGENTIAL * np.eye(3))
+        self.set_goals(points, normals[:, :, None] * normals[:, None, :] + TANGENTIAL * np.eye(3))
 
     def release(self) -> None:
         """Remove all goals but the given corners, until `aim` is called again."""
-        points, quadrics = self.fit.points.copy(), np.zeros((len(self.fit.points), 3, 3))
+        points, quadrics = self.points.copy(), np.zeros((len(self.points), 3, 3))
         if (given := self._surface.given_corners) is not None:
-            corner = np.isin(self.fit.places.parameters, (0.0, 1.0)).all(axis=1)  # in the order of the given ones
+            corner = np.isin(self.places.parameters, (0.0, 1.0)).all(axis=1)  # in the order of the given ones
             points[corner], quadrics[corner] = given, _GIVEN_CORNER * np.eye(3)
-        self.fit.aim(points, quadrics)
+        self.set_goals(points, quadrics)
 
     def restore(self, points: Array, relaxation: Array) -> None:
         """Set the state of a checkpoint, so that later distances round as they would without an interruption."""
-        self.fit.aim(points, np.zeros((len(points), 3, 3)))
-        self.fit.relax(relaxation)
+        self.set_goals(points, np.zeros((len(points), 3, 3)))
+        self.relax(relaxation)

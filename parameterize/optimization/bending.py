@@ -13,10 +13,9 @@ from numpy.typing import DTypeLike
 from ..arrays import Array, Floats, Knots
 from ..spline.bspline import collocation, gauss_points
 from ..spline.control_nets import ControlNets
-from .blockwise import Blockwise, side_by_side
 from .operators import PiecewiseOperator
 from .tensor_product import Band, apply_band, band
-from .term import RoundWeights
+from .term import Blockwise, RoundWeights, side_by_side
 
 Grams = list[tuple[Array, ...]]  # mass, stiffness and bending matrices (n, n), each for the three directions
 

@@ -19,10 +19,9 @@ from ..spline.bernstein import add_products, binomials, cross_products, extracti
 from ..spline.bspline import breakpoints
 from ..spline.control_nets import ControlNets
 from ..threads import in_parallel
-from .blockwise import Blockwise
 from .operators import PiecewiseOperator
 from .spans import numbers, with_neighbours
-from .term import RoundWeights
+from .term import Blockwise, RoundWeights
 
 MIN_COEFFICIENT = 0.1  # a Bernstein coefficient of det J below this is penalised on active spans; mean det J is 1
 _BLOCK = 32  # spans at a time: their arrays fit into the cache

@@ -11,11 +11,10 @@ from ..arrays import Array, Floats, Knots
 from ..quality.rotations import closest_rotations
 from ..spline.control_nets import ControlNets
 from ..threads import in_parallel
-from .blockwise import Blockwise
 from .matrices import cofactors_and_determinants, dots, least_eigenvalues, squared_norms
 from .operators import PiecewiseOperator
 from .tensor_product import SYMMETRIC, GaussGrid
-from .term import RoundWeights
+from .term import Blockwise, RoundWeights
 
 ARAP_LIMIT = 6.0  # times 1 + the mean distortion: larger distortion costs more, else a few elements are crushed
 _STIFFENING = 3.0  # weight of the squared excess above that limit

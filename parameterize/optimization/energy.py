@@ -19,10 +19,9 @@ from .bending import Fairness
 from .contact import ContactPenalty, contact_penalty
 from .determinant_penalty import DeterminantPenalty
 from .distortion import Distortion
-from .face_attraction import faces_towards
 from .normals import AlignmentPenalty, alignment_penalty
 from .operators import weighted_sum
-from .reassignment import reassign
+from .reassignment import faces_towards, reassign
 from .spans import acting_on, with_neighbours
 from .surface_distance import Correspondence
 from .tensor_product import KroneckerInverse
@@ -147,17 +146,17 @@ class SplineEnergy:
 
     def relax(self, spans: IntArray, factor: float) -> None:
         """Multiply by `factor` the weights of the boundary data in and next to the spans (k, 4) of the map."""
-        for fit in (self.surface, self.anchors.fit):
+        for fit in (self.surface, self.anchors):
             fit.relax(np.where(fit.places.near_spans(spans), factor, 1.0) * fit.relaxation)
 
     @property
     def yields(self) -> bool:
         """Return whether some of the boundary data have less than their whole weight."""
-        return any(bool((fit.relaxation < 1.0).any()) for fit in (self.surface, self.anchors.fit))
+        return any(bool((fit.relaxation < 1.0).any()) for fit in (self.surface, self.anchors))
 
     def take_back(self, factor: float) -> None:
         """Divide the factors that `relax` has applied by `factor`; a factor becomes 1 at most."""
-        for fit in (self.surface, self.anchors.fit):
+        for fit in (self.surface, self.anchors):
             fit.relax(np.minimum(fit.relaxation / factor, 1.0))
 
     def volume_part(self, control: Array) -> tuple[float, Array, int]:

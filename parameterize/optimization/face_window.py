@@ -60,7 +60,7 @@ class FaceWindow(NamedTuple):
 
     def of_rows(self, rows: slice) -> "FaceWindow":
         """Return the window of some of the points."""
-        return FaceWindow(*(array[rows] for array in self))
+        return FaceWindow(self.indices[rows], self.in_a[rows], self.in_b[rows])
 
     def weights(self, a: int, b: int) -> Array:
         """Return the weights (N, k) of the control points in the derivative of orders a and b."""
@@ -75,7 +75,7 @@ class FaceWindow(NamedTuple):
 
     def with_points(self, chosen: Mask, other: "FaceWindow") -> "FaceWindow":
         """Return this window with the rows of the chosen points (N,) replaced by the rows of another window."""
-        replaced = FaceWindow(*(array.copy() for array in self))
+        replaced = FaceWindow(self.indices.copy(), self.in_a.copy(), self.in_b.copy())
         for array, rows in zip(replaced, other, strict=True):
             array[chosen] = rows
         return replaced

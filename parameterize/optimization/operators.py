@@ -7,6 +7,7 @@ are added in the order of the pieces, so that every number of threads gives the 
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
+from itertools import islice
 from typing import Any
 
 import numba
@@ -39,11 +40,9 @@ def weighted_sum(terms: list[tuple[float, PiecewiseOperator]]) -> PiecewiseOpera
     """Return the sum of operators times their weights, as an operator that runs the pieces of all in one call."""
 
     def add(found: list[Any], x: Floats) -> Floats:
-        total, begin = np.zeros_like(x), 0
+        total, rest = np.zeros_like(x), iter(found)
         for weight, operator in terms:
-            end = begin + len(operator.pieces)
-            total += weight * operator.add(found[begin:end], x)
-            begin = end
+            total += weight * operator.add(list(islice(rest, len(operator.pieces))), x)
         return total
 
     return PiecewiseOperator([piece for _, operator in terms for piece in operator.pieces], add)

@@ -2,6 +2,11 @@
 
 A start of several blocks is a thin skeleton of the solid, and no layout tells where a point of the surface belongs.
 Between rounds the places that slides do not reach are found in this way.
+
+Before the surface's points draw F, all faces on the boundary of a thin start are drawn towards the surface. Where two
+limbs of it lie far apart, many points of the surface have the same nearest place on F, and would draw out a spike
+there. The other way round F comes closer evenly: each sample of its boundary is drawn to the nearest point of the
+surface that faces the same way.
 """
 
 from dataclasses import dataclass
@@ -13,7 +18,8 @@ from ..arrays import Array, IntArray
 from ..spline.bspline import divided_spans
 from ..spline.orientation import face_vectors
 from ..spline.spline_map import SplineMap
-from .surface_distance import Correspondence
+from .sliding import SlidingParameters
+from .surface_distance import TANGENTIAL, Correspondence
 
 _A_SPAN = 4  # samples a direction and span
 _NORMALS = 0.5  # length, at volume 1, by which normals are multiplied: perpendicular ones count as 0.7 apart
@@ -77,3 +83,26 @@ def boundary_samples(spline: SplineMap, a_span: int) -> BoundarySamples:
         unit = normals / np.maximum(lengths, 1e-300)[:, None]
         found.append((parameters, np.full(len(points), face), points, unit, lengths / len(points)))
     return BoundarySamples(*(np.concatenate(parts) for parts in zip(*found, strict=True)))
+
+
+_DRAWN_A_SPAN = 2  # samples a direction and span
+_FAR = 0.7  # times the width of a block: goals farther away than this hardly draw
+_AGREES = 0.5  # cosine of the angle between two normals that agree
+
+
+def faces_towards(surface: Correspondence, control: Array) -> Correspondence:
+    """Return samples of the boundary of F, with fixed parameters, whose goals are points of the surface.
+
+    A sample whose goal does not face the same way has no weight.
+    """
+    nets = surface.places.nets
+    samples = boundary_samples(SplineMap(nets, control), _DRAWN_A_SPAN)
+    chosen = nearest_aligned(surface.points, surface.normals, samples.points, samples.normals)
+    normals = surface.normals[chosen]
+    agrees = (normals * samples.normals).sum(axis=1) > _AGREES
+    quadrics = normals[:, :, None] * normals[:, None, :] + TANGENTIAL * np.eye(3)
+    widths = surface.places.boxes.min(axis=1)[samples.faces // 6]
+    distances = np.linalg.norm(surface.points[chosen] - samples.points, axis=1)
+    weights = samples.areas * agrees / (1.0 + (distances / (_FAR * widths)) ** 4)
+    places = SlidingParameters(nets, samples.parameters, samples.faces)
+    return Correspondence(places, surface.points[chosen], quadrics, weights / weights.sum())

@@ -2,15 +2,20 @@
 
 The energy of energy.py is lowered in rounds (newton.py), phase after phase (phases.py). After each round the map is
 certified, and unproved spans receive new weights.
+
+The first rounds move the map far, and need no fine spline for that; on fewer spans they take a fraction of the time.
+The map so found is then interpolated on the fine knots, for the other rounds.
 """
 
 import logging
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
-from ..arrays import IntArray
+from ..arrays import IntArray, Knots
 from ..checkpoint import Checkpoints
 from ..config import SplineConfig
 from ..progress import History, Progress, ProgressCallback, ignore, timed
+from ..spline.bspline import open_uniform_knots
 from ..spline.spline_map import SplineMap
 from ..threads import one_blas_thread
 from .certified_map import CertifiedMap
@@ -122,3 +127,39 @@ class _StepReport:
         steps = self.schedule.rounds * self.most  # at most: a round ends once it gains nothing more
         self.progress(Progress("spline", done + 1, steps, loss, point.folded, None))
         self.step += 1
+
+
+def coarse_knots(config: SplineConfig, share: float) -> Knots:
+    """Return the knots of the first rounds: a share of the spans a direction that F has in the end, at least one."""
+    spans = max(1, round(share * (config.control_points - config.degree)))
+    return (open_uniform_knots(config.degree + spans, config.degree),) * 3
+
+
+def optimize_coarse_first(
+    start: SplineMap,
+    fit: Correspondence,
+    config: SplineConfig,
+    schedule: Schedule,
+    weights: Weights,
+    *,
+    history: History,
+    progress: ProgressCallback,
+    checkpoints: Checkpoints,
+) -> tuple[CertifiedMap, Course, Correspondence]:
+    """Run the first phase on the knots of `start` and `fit`, the others on all; return map, course and data there.
+
+    start: on `coarse_knots`. The first rounds have a checkpoint of their own. Where both sets of
+    knots are the same, all rounds are one run.
+    """
+    report: dict[str, Any] = {"history": history, "progress": progress}
+    fine = (open_uniform_knots(config.control_points, config.degree),) * 3
+    if not start.nets.is_single or len(fine[0]) == len(start.knots[0]):
+        return *optimize(start, fit, config, schedule, weights, checkpoints=checkpoints, **report), fit
+    begun = min(schedule.grown or PATIENT_ROUNDS, schedule.rounds - 1)  # at least one round is on all
+    first = replace(schedule, rounds=begun)
+    kept = checkpoints.of_part("coarse")
+    found, earlier = optimize(start, fit, config, first, weights, checkpoints=kept, **report)
+    start = found.spline.interpolated(fine)
+    fit = fit.on_nets(start.nets)
+    found, course = optimize(start, fit, config, schedule, weights, checkpoints=checkpoints, begun=begun, **report)
+    return found, course.after(earlier), fit

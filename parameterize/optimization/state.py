@@ -56,7 +56,7 @@ class State:
 
     def save(self, checkpoints: Checkpoints, history: History) -> None:
         """Keep a checkpoint of the rounds, the sliding parameters, the weights and the spans that are watched."""
-        surface, anchors = self.energy.surface, self.energy.anchors.fit
+        surface, anchors = self.energy.surface, self.energy.anchors
         arrays = {
             "control": self.spline.control,
             "best": self.best.spline.control,

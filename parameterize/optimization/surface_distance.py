@@ -39,7 +39,7 @@ class Correspondence:
         self._weights = weights
         self.relaxation = np.ones(len(points))
         self._held = np.zeros(len(points), dtype=bool)
-        self.aim(points, quadrics)
+        self.set_goals(points, quadrics)
 
     def on_nets(self, nets: ControlNets) -> "Correspondence":
         """Return the same data for blocks with other knots, at the present parameters and weights."""
@@ -48,7 +48,7 @@ class Correspondence:
         other.relax(self.relaxation)
         return other
 
-    def aim(self, points: Array, quadrics: Array) -> None:
+    def set_goals(self, points: Array, quadrics: Array) -> None:
         """Set other points (N, 3) and quadrics (N, 3, 3) as goals."""
         self.points, self._quadrics = points, quadrics
         self.relax(self.relaxation)

@@ -73,21 +73,19 @@ def arap_grid(
     box: sides (3,) of the box that the map is measured against. Returns the points of each axis, the values
     (m_u, m_v, m_w) for each scale, and the weights of the integral over the cube.
     """
-    rules = [gauss_points(k, n_gauss) for k in volume.knots]
+    rules, weights = _rules(volume, n_gauss)
     u, v, w = (points.ravel() for points, _ in rules)
     values = [np.empty((len(u), len(v), len(w))) for _ in scales]
     for slab, jacobians in _slabs(volume, rules):
         for row, found in zip(values, _arap(jacobians / np.asarray(box), scales), strict=True):
             row[slab] = found
-    weights = np.einsum("i,j,k->ijk", *(weights.ravel() for _, weights in rules))
     return (u, v, w), values, weights
 
 
 def in_own_box(volume: BSplineVolume) -> BoxDistortion:
     """Measure a volume against its own box, at three Gauss points a direction and span."""
-    rules = [gauss_points(k, _N_GAUSS) for k in volume.knots]
-    weights = np.einsum("i,j,k->ijk", *(weights.ravel() for _, weights in rules))
-    box = _mean_lengths(volume, rules, weights)
+    rules, weights = _rules(volume, _N_GAUSS)
+    box = _own_box(volume, rules, weights)
     mean, size, largest, least = 0.0, 0.0, -np.inf, np.inf
     for slab, jacobians in _slabs(volume, rules):
         values = _arap(jacobians / box, (1.0,))[0]
@@ -98,24 +96,24 @@ def in_own_box(volume: BSplineVolume) -> BoxDistortion:
     return BoxDistortion((a, b, c), size, Distortion(mean, largest), least, weights.size)
 
 
-def own_box(volume: BSplineVolume) -> Array:
-    """Return the sides (3,) of a volume's own box: the mean lengths of F_u, F_v and F_w over the cube."""
-    rules = [gauss_points(k, _N_GAUSS) for k in volume.knots]
-    return _mean_lengths(volume, rules, np.einsum("i,j,k->ijk", *(weights.ravel() for _, weights in rules)))
-
-
 def own_boxes(body: BodyLike) -> Array:
-    """Return the sides (patches, 3) of the own box of each patch."""
-    return np.array([own_box(patch) for patch in as_body(body)])
+    """Return the sides (patches, 3) of each patch's own box: the mean lengths of F_u, F_v and F_w over the cube."""
+    return np.array([_own_box(patch, *_rules(patch, _N_GAUSS)) for patch in as_body(body)])
 
 
-def _mean_lengths(volume: BSplineVolume, rules: Rules, weights: Array) -> Array:
-    """Return the means (3,) of the lengths of the Jacobian's columns. weights: (m_u, m_v, m_w), of all points."""
+def _own_box(volume: BSplineVolume, rules: Rules, weights: Array) -> Array:
+    """Return the sides (3,) of a volume's own box from the values at the points of rules."""
     parts = (
         np.einsum("ijk,ijka->a", weights[slab], np.linalg.norm(jacobians, axis=-2))
         for slab, jacobians in _slabs(volume, rules)
     )
     return np.asarray(sum(parts, np.zeros(3)))
+
+
+def _rules(volume: BSplineVolume, n_gauss: int) -> tuple[Rules, Array]:
+    """Return the Gauss points and weights of each direction, and the weights (m_u, m_v, m_w) of all points."""
+    rules = [gauss_points(k, n_gauss) for k in volume.knots]
+    return rules, np.einsum("i,j,k->ijk", *(weights.ravel() for _, weights in rules))
 
 
 def _slabs(volume: BSplineVolume, rules: Rules) -> Iterator[tuple[slice, Array]]:
@@ -127,16 +125,11 @@ def _slabs(volume: BSplineVolume, rules: Rules) -> Iterator[tuple[slice, Array]]
         yield slab, _unmirrored(volume, u[slab], v, w)
 
 
-def arap_on(volume: BSplineVolume, u: ArrayLike, v: ArrayLike, w: ArrayLike, scale: float = 1.0) -> Array:
-    """Return the ARAP distortion of scale * F on a tensor grid: (len(u), len(v), len(w)).
+def arap_on(volume: BSplineVolume, u: ArrayLike, v: ArrayLike, w: ArrayLike, box: ArrayLike = 1.0) -> Array:
+    """Return the ARAP distortion of the map from a box on a tensor grid: (len(u), len(v), len(w)).
 
-    A left-handed volume is as distorted as its mirror image.
+    box: its sides (3,), or the length of all three. A left-handed volume is as distorted as its mirror image.
     """
-    return _arap(_unmirrored(volume, u, v, w), (scale,))[0]
-
-
-def arap_in_box(volume: BSplineVolume, u: ArrayLike, v: ArrayLike, w: ArrayLike, box: ArrayLike) -> Array:
-    """Return the ARAP distortion of the map from a box with sides (3,) on a tensor grid: (len(u), len(v), len(w))."""
     return _arap(_unmirrored(volume, u, v, w) / np.asarray(box), (1.0,))[0]
 
 

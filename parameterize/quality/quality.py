@@ -18,11 +18,10 @@ from ..spline.orientation import enclosed_volume
 from ..spline.volume import FACE_NAMES
 from ..surface.features import SHARP
 from ..surface.geometry import signed_volume
-from .distances import Distances
+from .distances import Distances, two_sided
 from .distortion import BoxDistortion, Distortion, arap_grid, in_own_box
 from .proved import proved
 from .sharpness import Sharpness, sharpness_of
-from .two_sided import two_sided
 
 Measure = TypeVar("Measure", Distortion, Distances)
 

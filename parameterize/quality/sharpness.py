@@ -84,16 +84,11 @@ def _samples(found: Features, vertices: Array) -> tuple[Array, Array]:
 
 def distance_to_edges(points: Array, body: BodyLike) -> Array:
     """Return the distances (k,) of points (k, 3) from the nearest edge of an outer face of a body."""
-    pieces = np.concatenate([curve for patch, names in _outer(body) for curve in _edges(patch, names)])
+    several = as_body(body)
+    pieces = np.concatenate([curve for each in zip(several, several.outer, strict=True) for curve in _edges(*each)])
     ends = np.ascontiguousarray(pieces.reshape(-1, 3))
     squared = igl.point_mesh_squared_distance(points, ends, np.arange(len(ends)).reshape(-1, 2))[0]
     return np.sqrt(np.asarray(squared).ravel())
-
-
-def _outer(body: BodyLike) -> list[tuple[BSplineVolume, tuple[str, ...]]]:
-    """Return the patches of a body with the names of their outer faces."""
-    several = as_body(body)
-    return list(zip(several.patches, several.outer, strict=True))
 
 
 def _edges(patch: BSplineVolume, names: tuple[str, ...]) -> list[Array]:

@@ -2,15 +2,20 @@
 
 A block is a cube that a spline maps into space. The optimization holds all blocks of a body together: control points
 (3, n), component first, block after block, each net in the order u, v, w. One cube is a body of one block.
+
+A span of a direction is the slab of a block between two neighbouring knots. An interface makes the slabs on both of its
+sides continue each other, so that a knot inserted into the one must be inserted into the other. A slab that comes back
+to its block through a loop of others, turned, is one with a slab of another direction there, or with its mirror image.
 """
 
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 
 from ..arrays import Array, Floats, IntArray, Knots, Mask
-from .body import shared_numbers
+from .body import numbers_of_classes, shared_numbers
 from .bspline import breakpoints
 from .interface import Interface, axis_side
 
@@ -95,3 +100,20 @@ class ControlNets:
                 axis, side = axis_side(face)
                 exposed[6 * block + 2 * axis + side] = False
         return exposed
+
+
+def tied_spans(nets: ControlNets) -> list[IntArray]:
+    """Return for each direction of each block, in the order u, v, w of block after block, the classes of its spans.
+
+    Spans that interfaces make one have the same class. Classes have the numbers from 0 on, in the order in which their
+    first spans come; without interfaces each span has its own.
+    """
+    starts = np.cumsum([0, *(count for counts in nets.spans for count in counts)])
+    rows = [np.arange(first, last) for first, last in pairwise(starts)]
+    pairs = [np.empty((2, 0), dtype=np.int64)]
+    for interface in nets.interfaces:
+        for a, b, flip in interface.directions:
+            row = rows[3 * interface.second[0] + b]
+            pairs.append(np.stack([rows[3 * interface.first[0] + a], row[::-1] if flip else row]))
+    classes = numbers_of_classes(int(starts[-1]), np.concatenate(pairs, axis=1))
+    return [classes[row] for row in rows]

@@ -63,6 +63,12 @@ class Interface:
         is_ring = p == q and face_p[0] == face_q[0] and not self.swapped and not any(self.flipped)
         return axis_side(face_p)[0] if is_ring else None
 
+    @property
+    def directions(self) -> tuple[tuple[int, int, bool], ...]:
+        """Return each direction of the first face, that of the second one along it, and whether they are opposite."""
+        second = varying(self.second[1])
+        return tuple(zip(varying(self.first[1]), second[::-1] if self.swapped else second, self.flipped, strict=True))
+
     def turned(self, second: Floats) -> Floats:
         """Return an array (m_a, m_b, ...) of the second face in the order of the first."""
         array = second.swapaxes(0, 1) if self.swapped else second
@@ -109,9 +115,8 @@ def orientations(first: Face, second: Face) -> Iterator[Interface]:
 
 def knots_agree(patches: Sequence[BSplineVolume], interface: Interface) -> bool:
     """Return whether degrees and knots along the two faces of an interface are the same, up to KNOT_TOLERANCE."""
-    (p, face_p), (q, face_q) = interface.first, interface.second
-    axes_q = varying(face_q)[::-1] if interface.swapped else varying(face_q)
-    for axis_p, axis_q, flip in zip(varying(face_p), axes_q, interface.flipped, strict=True):
+    p, q = interface.first[0], interface.second[0]
+    for axis_p, axis_q, flip in interface.directions:
         row, other = patches[p].knots[axis_p], patches[q].knots[axis_q]
         if patches[p].degrees[axis_p] != patches[q].degrees[axis_q] or len(row) != len(other):
             return False

@@ -1,16 +1,17 @@
 """SampledBoundary: points on the outer faces of a body of trivariate splines, and the triangles between them."""
 
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import ceil, sqrt
 
 import numpy as np
 
 from ..arrays import Array, IntArray
-from .body import BodyLike, as_body
+from .body import Body, BodyLike, as_body
 from .bspline import breakpoints, divided_spans
+from .interface import axis_side
 from .orientation import FACES
-from .volume import FACE_NAMES, BSplineVolume
+from .volume import BSplineVolume
 
 SAMPLES = 160  # a direction and face of a cube, at least; more faces than six share as many samples
 PER_SPAN = 3  # samples a direction in every span, at least
@@ -43,15 +44,13 @@ class SampledBoundary:
         several = as_body(body)
         share = min(1.0, sqrt(len(FACES) / sum(map(len, several.outer))))
         least = max(2, ceil(share * samples))
-        parts = zip(several.patches, several.outer, strict=True)
-        return cls._joined([cls._on_faces(patch, _rows(patch, least), names) for patch, names in parts])
+        return cls._at(several, [_rows(patch, least) for patch in several])
 
     @classmethod
     def on(cls, body: BodyLike, *rows: Array) -> "SampledBoundary":
         """Sample all outer faces, those of all patches at the same three rows of parameters, each from 0 to 1."""
         several = as_body(body)
-        parts = zip(several.patches, several.outer, strict=True)
-        return cls._joined([cls._on_faces(patch, rows, names) for patch, names in parts])
+        return cls._at(several, [rows] * len(several))
 
     @property
     def sample_faces(self) -> IntArray:
@@ -61,36 +60,22 @@ class SampledBoundary:
         return faces
 
     @classmethod
-    def _on_faces(cls, volume: BSplineVolume, rows: Sequence[Array], names: Collection[str]) -> "SampledBoundary":
-        """Sample some faces of a volume, which is patch 0, at three rows of parameters."""
-        parameters, points, triangles, cube_faces = [np.empty((0, 3))], [np.empty((0, 3))], [_NONE], [_NONE[:, 0]]
-        count = 0
-        for k, (axis, side) in enumerate(FACES):
-            if FACE_NAMES[k] not in names:
-                continue
-            u, v, w = (np.array([float(side)]) if d == axis else row for d, row in enumerate(rows))
-            parameters.append(np.stack(np.meshgrid(u, v, w, indexing="ij"), axis=-1).reshape(-1, 3))
-            points.append(volume.grid(u, v, w).reshape(-1, 3))
-            face = _halved_cells(*(len(row) for d, row in enumerate(rows) if d != axis))
-            inwards = (side == 1) == (axis == 1)  # (u, w) is left-handed seen along v
-            triangles.append(count + (face[:, ::-1] if inwards else face))
-            cube_faces.append(np.full(len(face), k))
-            count += len(parameters[-1])
-        places, where = np.concatenate(parameters), np.concatenate(points)
-        owners = np.zeros(count, dtype=np.int64)
-        return cls(places, where, np.concatenate(triangles), np.concatenate(cube_faces), owners)
-
-    @classmethod
-    def _joined(cls, parts: Sequence["SampledBoundary"]) -> "SampledBoundary":
-        """Join the samples of the patches, in their order."""
-        starts = np.cumsum([0, *(len(part.points) for part in parts)])
-        return cls(
-            np.concatenate([part.parameters for part in parts]),
-            np.concatenate([part.points for part in parts]),
-            np.concatenate([start + part.triangles for start, part in zip(starts, parts, strict=False)]),
-            np.concatenate([part.cube_faces for part in parts]),
-            np.concatenate([np.full(len(part.points), number) for number, part in enumerate(parts)]),
-        )
+    def _at(cls, body: Body, rows: Sequence[Sequence[Array]]) -> "SampledBoundary":
+        """Sample the outer faces of each patch at its three rows of parameters."""
+        parts, count = [(np.empty((0, 3)), np.empty((0, 3)), _NONE, _NONE[:, 0], _NONE[:, 0])], 0
+        for number, (patch, names) in enumerate(zip(body, body.outer, strict=True)):
+            for name in names:
+                axis, side = axis_side(name)
+                u, v, w = (np.array([float(side)]) if d == axis else row for d, row in enumerate(rows[number]))
+                points = patch.grid(u, v, w).reshape(-1, 3)
+                places = np.stack(np.meshgrid(u, v, w, indexing="ij"), axis=-1).reshape(-1, 3)
+                face = _halved_cells(*(len(row) for d, row in enumerate(rows[number]) if d != axis))
+                inwards = (side == 1) == (axis == 1)  # (u, w) is left-handed seen along v
+                triangles = count + (face[:, ::-1] if inwards else face)
+                faces, owners = np.full(len(face), 2 * axis + side), np.full(len(points), number)
+                parts.append((places, points, triangles, faces, owners))
+                count += len(points)
+        return cls(*map(np.concatenate, zip(*parts, strict=True)))
 
 
 def _rows(volume: BSplineVolume, samples: int) -> tuple[Array, Array, Array]:

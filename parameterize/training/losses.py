@@ -4,19 +4,56 @@ Each term has the name of its weight in `StageWeights`. The paper gives the form
 of L_bound in section 4.4.1, those of L_inner in 4.4.2.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 import torch
 from torch import Tensor
 
 from ..arrays import IntArray
+from ..config import StageName
 from ..cube.cube import CORNERS
-from .matrices import closest_rotation, cofactor, determinant
+from ..quality.rotations import closest_rotations
 from .network import InverseMap, map_in_pieces
 from .samples import OFFSETS, Stencils, TriangleSampler, gather
-from .stages import Stage
 from .target_shapes import nearest, nearest_on_cube_face
+
+Target = Literal["S(2)", "S(1)", "cube"]
+
+
+@dataclass(frozen=True)
+class StageWeights:
+    """Hold the weights of the loss terms in one stage, a row of the paper's Table 1; the defaults are its first row."""
+
+    bij: float = 1e6
+    arap: float = 1.0
+    fair: float = 2e-3
+    dist: float = 1e3
+    norm: float = 10.0
+    star: float = 1e3
+    cor: float = 0.0
+    edge: float = 0.0
+
+
+@dataclass(frozen=True)
+class Stage:
+    """Hold the target shape of the mapped surface in a stage, and the weights of the loss."""
+
+    target: Target
+    weights: StageWeights
+
+
+_FREE = StageWeights()
+_HELD = StageWeights(dist=1e4, cor=1e3)
+STAGES: dict[StageName, Stage] = {  # S(2) and S(1) are the paper's first stage
+    "S(2)": Stage("S(2)", _FREE),
+    "S(1)": Stage("S(1)", _FREE),
+    "cube": Stage("cube", _FREE),
+    "corners": Stage("cube", _HELD),
+    "edges": Stage("cube", replace(_HELD, edge=1e4)),
+}
+
 
 _ALPHA = 0.1  # determinants of G's Jacobian below this count as folds (section 4.4.2)
 _LEAST_DET = 0.5 * _ALPHA  # held in the distortion term: bijectivity rules below it, and 1 / det must not blow up
@@ -204,3 +241,25 @@ def edge_path(mapped: Tensor, target: Tensor, following: Tensor) -> Tensor:
     direction = step / step.norm(dim=1, keepdim=True).clamp_min(1e-12)
     aim = aim / aim.norm(dim=1, keepdim=True).clamp_min(1e-12)
     return distance(mapped, target) + _DIRECTIONS * (direction - aim).square().sum(dim=1).mean()
+
+
+def determinant(j: Tensor) -> Tensor:
+    """Return the determinants (m,) of matrices (3, 3, m)."""
+    return (j[:1] * _cross(j[1:2], j[2:])).sum(dim=(0, 1))
+
+
+def cofactor(j: Tensor) -> Tensor:
+    """Return the cofactors (3, 3, m) of matrices J (3, 3, m): the inverse of J is the transpose over det J."""
+    cyclic = torch.cat([j, j[:2]])
+    return _cross(cyclic[1:4], cyclic[2:5])
+
+
+def _cross(a: Tensor, b: Tensor) -> Tensor:
+    """Return the cross products of rows (k, 3, m), row by row; slices along the samples are fast."""
+    a, b = torch.cat([a, a[:, :2]], dim=1), torch.cat([b, b[:, :2]], dim=1)  # (k, 5, m)
+    return torch.addcmul(a[:, 1:4] * b[:, 2:5], a[:, 2:5], b[:, 1:4], value=-1.0)
+
+
+def closest_rotation(j: Tensor) -> Tensor:
+    """Return the rotation closest to each matrix of (3, 3, m), without a gradient: see `closest_rotations`."""
+    return torch.from_numpy(closest_rotations(j.detach().cpu().numpy())).to(j.device)

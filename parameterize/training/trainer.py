@@ -22,15 +22,15 @@ from ..cube.edge_paths import PathError, choose_corners, cut_surface, edge_targe
 from ..cube.turning import best_turn, concavity
 from ..progress import History, Progress, ProgressCallback
 from ..surface.solid import Solid
-from .losses import BoundaryData, EdgePaths, Objective
+from .losses import STAGES, BoundaryData, EdgePaths, Objective
 from .network import InverseMap
 from .optimizer import TrainingOptimizer
 from .samples import TriangleSampler, stencils
-from .stages import STAGES
 
 _log = logging.getLogger(__name__)
 State = dict[str, Tensor]
 _CHECKPOINT, _CHECKPOINT_STEPS = "training", 100
+_MAPPED = 65_536  # points of `map_points` at a time
 _COMPARED_STEPS = 8  # the last ones of a race, whose mean distortions are compared
 _RACE_GAIN = 0.05  # share by which the turned G must be better, first in concavity and then in distortion
 
@@ -299,7 +299,7 @@ def _part(tensors: State, prefix: str) -> State:
 
 
 @torch.no_grad()
-def map_points(network: InverseMap, points: Array, block: int = 65_536) -> Array:
+def map_points(network: InverseMap, points: Array) -> Array:
     """Return G (m, 3) at points (m, 3) as float64, computed in blocks, on the network's device and in its precision."""
     pieces = torch.as_tensor(points).to(network.affine)
-    return np.asarray(torch.cat([network(piece) for piece in torch.split(pieces, block)]).double().cpu())
+    return np.asarray(torch.cat([network(piece) for piece in torch.split(pieces, _MAPPED)]).double().cpu())

@@ -6,7 +6,6 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from ..arrays import Array
-from ..coarse import coarse_knots
 from ..cube.constrained import Constrained
 from ..cube.cube import CORNERS, project_radially, snap
 from ..cube.cube_layout import CubeLayout
@@ -14,6 +13,7 @@ from ..cube.cutting import cut_along_rays, subdivide_finely
 from ..cube.sphere import lay_on_sphere
 from ..cube.turning import best_turn
 from ..optimization.least_squares import fit_pairs
+from ..optimization.rounds import coarse_knots
 from ..optimization.sliding import SlidingParameters
 from ..optimization.surface_distance import Correspondence
 from ..spline.control_nets import ControlNets

@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from ..checkpoint import Checkpoints
-from ..coarse import optimize_coarse_first
 from ..optimization.certified_map import CertifiedMap
 from ..optimization.endings import Course
 from ..optimization.phases import Schedule
 from ..optimization.reassignment import boundary_samples
+from ..optimization.rounds import optimize_coarse_first
 from ..optimization.surface_distance import Correspondence
 from ..optimization.term import Weights
 from ..progress import timed
