@@ -14,8 +14,7 @@ from scipy.sparse import coo_array, csr_array, diags_array
 from scipy.sparse.linalg import cg
 
 from .arrays import Array, IntArray
-from .cube.cube import VARYING_AXES
-from .cube.cube_layout import CubeLayout
+from .cube.cube import VARYING_AXES, CubeLayout
 
 _OFFSET = np.array([0.512345, 0.498765, 0.543211])  # in cells: no line of the lattice runs along faces of a model
 _TOLERANCE = 1e-6  # of the linear solves, relative: a fit to the places follows, and is far coarser

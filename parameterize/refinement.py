@@ -16,10 +16,9 @@ from .arrays import Array, IntArray, Knots
 from .certificate.determinant import DeterminantForm
 from .checkpoint import Checkpoints
 from .config import RefinementConfig, SplineConfig
-from .optimization.certified_map import CertifiedMap
 from .optimization.determinant_penalty import MIN_COEFFICIENT
 from .optimization.distortion import ARAP_LIMIT
-from .optimization.endings import Course
+from .optimization.endings import CertifiedMap, Course
 from .optimization.phases import FIRM_ROUNDS, Polish, Schedule, Separate, Unfold
 from .optimization.rounds import optimize
 from .optimization.spans import in_blocks
@@ -30,8 +29,7 @@ from .quality.distances import two_sided
 from .quality.distortion import arap_grid, own_boxes
 from .spline.body import shared_numbers
 from .spline.bspline import breakpoints, midpoints
-from .spline.control_nets import ControlNets, tied_spans
-from .spline.spline_map import SplineMap
+from .spline.spline_map import ControlNets, SplineMap, tied_spans
 from .spline.volume import AXES
 
 _log = logging.getLogger(__name__)

@@ -16,10 +16,10 @@ from .certificate.boundary import check_boundary
 from .checkpoint import Checkpoints
 from .config import Config, preset
 from .cube.boundary_map import BoundaryMap, boundary_map
-from .cube.cube_layout import CubeLayout
+from .cube.cube import CubeLayout
 from .display import Brief
 from .old_names import renamed
-from .optimization.certified_map import CertifiedMap
+from .optimization.endings import CertifiedMap
 from .optimization.reassignment import reassign
 from .optimization.surface_distance import Correspondence
 from .progress import History, ProgressCallback, ignore, timed

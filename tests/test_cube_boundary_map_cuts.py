@@ -3,7 +3,7 @@ import pytest
 from shapes import area, ball, is_closed, turned
 
 from parameterize.cube.boundary_map import BoundaryMap, boundary_map
-from parameterize.cube.cube_layout import CubeLayout
+from parameterize.cube.cube import CubeLayout
 from parameterize.cube.cutting import cut_along_rays
 from parameterize.spline.bspline import greville, open_uniform_knots
 from parameterize.spline.volume import BSplineVolume

@@ -5,8 +5,7 @@ from plane_bodies import arrays
 from shapes import turned
 
 from parameterize.cube.constrained import choose_sharp_corners, constrained
-from parameterize.cube.cube import CORNERS, project_radially, snap
-from parameterize.cube.cube_layout import CubeLayout
+from parameterize.cube.cube import CORNERS, CubeLayout, project_radially, snap
 from parameterize.cube.cutting import subdivide_finely
 from parameterize.cube.edge_paths import lay_out
 from parameterize.cube.flips import flipped

@@ -3,8 +3,7 @@ import pytest
 from scipy.spatial import ConvexHull
 from shapes import ball, rounded_cube, turned
 
-from parameterize.cube.cube import CORNERS, EDGES
-from parameterize.cube.cube_layout import CubeLayout
+from parameterize.cube.cube import CORNERS, EDGES, CubeLayout
 from parameterize.cube.edge_paths import PathError, choose_corners, cut_surface, edge_targets
 
 

@@ -2,8 +2,7 @@ import numpy as np
 import pytest
 from shapes import rounded_cube, turned
 
-from parameterize.cube.cube import CORNERS, snap
-from parameterize.cube.cube_layout import CubeLayout
+from parameterize.cube.cube import CORNERS, CubeLayout, snap
 from parameterize.cube.edge_paths import PathError, choose_corners, lay_out
 from parameterize.cube.flips import flipped
 

@@ -7,8 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 from shapes import ball, rounded_cube
 
-from parameterize.cube.cube import project_radially
-from parameterize.cube.cube_layout import CubeLayout
+from parameterize.cube.cube import CubeLayout, project_radially
 from parameterize.cube.turning import _HOLLOW, _OTHER_TURN, _angle_between, _bends, _concavity, best_turn
 
 

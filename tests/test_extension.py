@@ -7,7 +7,7 @@ import pytest
 import trimesh
 from shapes import ball, turned
 
-from parameterize.cube.cube_layout import CubeLayout
+from parameterize.cube.cube import CubeLayout
 from parameterize.extension import extended
 
 CELL = 0.07

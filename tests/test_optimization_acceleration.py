@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from parameterize.optimization.acceleration import Acceleration
+from parameterize.optimization.newton import Acceleration
 
 
 def linear_iteration(size, seed=0):

@@ -8,8 +8,8 @@ from parameterize.optimization.anchors import Anchors, edge_points, face_points
 from parameterize.optimization.sliding import SlidingParameters
 from parameterize.optimization.surface_distance import TANGENTIAL, Correspondence
 from parameterize.spline.bspline import greville, open_uniform_knots
-from parameterize.spline.control_nets import ControlNets
 from parameterize.spline.interface import Interface
+from parameterize.spline.spline_map import ControlNets
 from parameterize.spline.volume import FACE_NAMES
 from parameterize.surface.geometry import vertex_quadrics, vertex_weights
 

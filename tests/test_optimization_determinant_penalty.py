@@ -7,8 +7,7 @@ from bernstein import bernstein_coefficients
 from parameterize.optimization.determinant_penalty import DeterminantPenalty
 from parameterize.optimization.spans import in_blocks
 from parameterize.spline.bspline import greville, open_uniform_knots
-from parameterize.spline.control_nets import ControlNets
-from parameterize.spline.spline_map import SplineMap
+from parameterize.spline.spline_map import ControlNets, SplineMap
 from parameterize.spline.volume import BSplineVolume
 
 

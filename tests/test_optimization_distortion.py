@@ -6,7 +6,7 @@ from parameterize.optimization.determinant_penalty import DeterminantPenalty
 from parameterize.optimization.distortion import _MIN_DET, BlockDistortion, Distortion
 from parameterize.optimization.spans import in_blocks
 from parameterize.spline.bspline import greville, open_uniform_knots
-from parameterize.spline.control_nets import ControlNets
+from parameterize.spline.spline_map import ControlNets
 from parameterize.spline.volume import BSplineVolume
 
 

@@ -7,7 +7,7 @@ from parameterize.optimization.operators import ControlRows
 from parameterize.optimization.sliding import SlidingParameters
 from parameterize.optimization.surface_distance import Correspondence
 from parameterize.spline.bspline import greville, open_uniform_knots
-from parameterize.spline.control_nets import ControlNets
+from parameterize.spline.spline_map import ControlNets
 from parameterize.surface.geometry import vertex_normals
 
 FLOOR = 0.3

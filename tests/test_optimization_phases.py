@@ -7,15 +7,13 @@ import numpy as np
 import pytest
 from test_optimization_rounds import surface_fit
 
-from parameterize.optimization.certified_map import CertifiedMap
-from parameterize.optimization.endings import Course, Reason
+from parameterize.optimization.endings import CertifiedMap, Course, Reason
 from parameterize.optimization.energy import SplineEnergy
 from parameterize.optimization.phases import Polish, Schedule, Separate, Shape, Unfold
 from parameterize.optimization.state import State
 from parameterize.optimization.term import Weights
 from parameterize.spline.bspline import greville, open_uniform_knots
-from parameterize.spline.control_nets import ControlNets
-from parameterize.spline.spline_map import SplineMap
+from parameterize.spline.spline_map import ControlNets, SplineMap
 from parameterize.ways.growth import Grow
 
 KNOTS = (open_uniform_knots(14, 3),) * 3

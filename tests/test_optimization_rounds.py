@@ -19,8 +19,7 @@ from parameterize.optimization.term import RoundWeights, Weights
 from parameterize.progress import History
 from parameterize.quality.distortion import arap
 from parameterize.spline.bspline import gauss_points, greville, open_uniform_knots
-from parameterize.spline.control_nets import ControlNets
-from parameterize.spline.spline_map import SplineMap
+from parameterize.spline.spline_map import ControlNets, SplineMap
 from parameterize.spline.volume import BSplineVolume
 from parameterize.surface.geometry import vertex_quadrics, vertex_weights
 

@@ -9,8 +9,7 @@ from parameterize.checkpoint import Checkpoints
 from parameterize.config import RefinementConfig, SplineConfig
 from parameterize.cube.cube import project_radially
 from parameterize.cube.cutting import subdivide_finely
-from parameterize.optimization.certified_map import CertifiedMap
-from parameterize.optimization.endings import Course, Reason
+from parameterize.optimization.endings import CertifiedMap, Course, Reason
 from parameterize.optimization.phases import FIRM_ROUNDS, RAMP, Polish, Schedule, Separate, Shape, Unfold
 from parameterize.optimization.rounds import optimize
 from parameterize.optimization.sliding import SlidingParameters
@@ -20,8 +19,7 @@ from parameterize.progress import History, ignore
 from parameterize.quality.distances import two_sided
 from parameterize.refinement import refine
 from parameterize.spline.bspline import greville, open_uniform_knots
-from parameterize.spline.control_nets import ControlNets
-from parameterize.spline.spline_map import SplineMap
+from parameterize.spline.spline_map import ControlNets, SplineMap
 from parameterize.surface.geometry import vertex_quadrics, vertex_weights
 
 CONFIG = SplineConfig(control_points=6, steps=12)

@@ -4,8 +4,8 @@ import pytest
 from parameterize import refinement
 from parameterize.refinement import halved_where_most, totals_along
 from parameterize.spline.bspline import breakpoints, open_uniform_knots
-from parameterize.spline.control_nets import ControlNets
 from parameterize.spline.interface import Interface
+from parameterize.spline.spline_map import ControlNets
 
 KNOTS = tuple(open_uniform_knots(n, 3) for n in (7, 6, 5))  # 4, 3 and 2 spans
 COUNTS = (7, 6, 5)

@@ -3,8 +3,8 @@
 import numpy as np
 from block_bodies import uniform_nets
 
-from parameterize.spline.control_nets import tied_spans
 from parameterize.spline.interface import Interface
+from parameterize.spline.spline_map import tied_spans
 
 
 def classes(*spans, interfaces=()):

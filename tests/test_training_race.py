@@ -11,7 +11,7 @@ from shapes import ball
 from small_run import STEPS, small_surface, tiny_config
 
 from parameterize.config import NetworkConfig
-from parameterize.cube.cube_layout import CubeLayout
+from parameterize.cube.cube import CubeLayout
 from parameterize.cube.turning import best_turn, concavity
 from parameterize.run import parameterize
 from parameterize.training import trainer

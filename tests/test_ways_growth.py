@@ -11,7 +11,7 @@ from small_run import tiny_config
 from parameterize import parameterize
 from parameterize.config import preset
 from parameterize.cube.flips import flipped
-from parameterize.optimization.certified_map import CertifiedMap
+from parameterize.optimization.endings import CertifiedMap
 from parameterize.optimization.term import Weights
 from parameterize.progress import History, Progress, ignore
 from parameterize.spline.bspline import open_uniform_knots

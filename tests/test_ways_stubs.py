@@ -10,8 +10,7 @@ from thick_bodies import eared
 import parameterize.ways.stubs as ways
 from parameterize.checkpoint import Checkpoints
 from parameterize.config import preset
-from parameterize.optimization.certified_map import CertifiedMap
-from parameterize.optimization.endings import Course, Reason
+from parameterize.optimization.endings import CertifiedMap, Course, Reason
 from parameterize.optimization.term import Weights
 from parameterize.progress import History, ignore
 from parameterize.spline.spline_map import SplineMap

@@ -36,10 +36,10 @@ from parameterize import config
 from parameterize.files import save_text
 from parameterize.layouts.rods import along_skeleton as layout
 from parameterize.optimization import anchors, phases, rounds
-from parameterize.optimization.acceleration import Acceleration
 from parameterize.optimization.anchors import Anchors
 from parameterize.optimization.endings import Reason
 from parameterize.optimization.energy import SplineEnergy
+from parameterize.optimization.newton import Acceleration
 from parameterize.optimization.sliding import SlidingParameters
 from parameterize.ways import blocks, growth, network, one_cube, sharp, strategy, stubs
 

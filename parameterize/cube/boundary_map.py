@@ -17,8 +17,7 @@ from ..spline.bspline import real_array
 from ..spline.volume import FACE_NAMES, BSplineVolume
 from ..surface.groups import Groups, as_arrays, checked, from_arrays
 from ..surface.part import PartSurface
-from .cube import damped_fit, snap
-from .cube_layout import CubeLayout
+from .cube import CubeLayout, damped_fit, snap
 from .cutting import CutMesh, cut_along_rays
 from .flips import orientation, untangle_whole
 

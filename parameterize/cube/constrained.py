@@ -13,8 +13,7 @@ from scipy.optimize import linear_sum_assignment
 from ..arrays import Array, IntArray, Mask
 from ..surface.geometry import edge_table
 from ..surface.ridges import Ridges
-from .cube import CORNERS, EDGES, axis_and_side, face_number, nearest_faces
-from .cube_layout import CubeLayout
+from .cube import CORNERS, EDGES, CubeLayout, axis_and_side, face_number, nearest_faces
 
 OFF_RIDGES = (0.85, 1.5)  # by which a corner off all ridges counts as farther away on the cube: the usual, and for rims
 # that are far from the corners, such as the small one of a cone

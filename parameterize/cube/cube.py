@@ -4,6 +4,7 @@ A face has the number 2 * axis + side: `axis` is the parameter that is constant 
 the order of their numbers the faces are called u0, u1, v0, v1, w0, w1.
 """
 
+from dataclasses import dataclass
 from typing import Any
 
 import numba
@@ -76,3 +77,23 @@ def damped_solution(aa: Any, bb: Any, ab: Any, ra: Any, rb: Any, damping: float)
     aa, bb = aa + lift, bb + lift
     determinant = aa * bb - ab * ab
     return (bb * ra - ab * rb) / determinant, (aa * rb - ab * ra) / determinant
+
+
+@dataclass(frozen=True, eq=False)
+class CubeLayout:
+    """Hold a closed surface and its layout on the boundary of the cube, vertex by vertex.
+
+    points: (n, 3), on the surface; the mesh's own vertices come first, the vertices of cut edges follow.
+
+    faces: (m, 3), the triangles between the points, outward.
+
+    places: (n, 3), the points' places on the boundary of the cube, or near it as long as the layout has to be
+    untangled. In the layout on the sphere (sphere.py, turning.py) the places are unit vectors from the origin.
+
+    n_own: the number of the mesh's own vertices.
+    """
+
+    points: Array
+    faces: IntArray
+    places: Array
+    n_own: int

@@ -12,7 +12,7 @@ import numpy as np
 
 from ..arrays import Array, IntArray
 from ..surface.geometry import edge_table
-from .cube_layout import CubeLayout
+from .cube import CubeLayout
 
 NEAR_VERTEX = 0.1  # share of an edge's length: a crossing this close to a vertex takes the vertex and leaves no sliver
 _COARSENING = 1.25  # factor of the longest edge each time a mesh would get too many points

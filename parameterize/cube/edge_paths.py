@@ -17,8 +17,7 @@ from scipy.sparse.linalg import splu
 from ..arrays import Array, IntArray, Mask
 from ..surface.geometry import connected, directed_edges, edge_table, edge_triangles
 from ..surface.ridges import Ridges
-from .cube import CORNERS, EDGES, axis_and_side, face_number, project_radially, tangent_axes
-from .cube_layout import CubeLayout
+from .cube import CORNERS, EDGES, CubeLayout, axis_and_side, face_number, project_radially, tangent_axes
 from .cutting import cut_along_rays, split_edges
 
 _STRAY = 20.0  # extra cost of a path, relative to its length, at the distance _STRAY_DISTANCE from its cube edge

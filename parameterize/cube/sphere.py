@@ -22,7 +22,7 @@ from ..arrays import Array, IntArray, Mask
 from ..checkpoint import Checkpoints
 from ..progress import Progress, ProgressCallback, ignore
 from ..surface.geometry import edge_table, normals_and_areas
-from .cube_layout import CubeLayout
+from .cube import CubeLayout
 from .cutting import split_edges
 
 _Weigh = Callable[[Array, Array, Mask], Array]

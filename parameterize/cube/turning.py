@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 from ..arrays import Array
 from ..surface.geometry import edge_triangles, normals_and_areas
 from ..threads import in_parallel
-from .cube_layout import CubeLayout
+from .cube import CubeLayout
 
 _TURNS = 200  # rotations of the cube that are drawn at random
 _FINALISTS = 5  # the best of these, which are turned further

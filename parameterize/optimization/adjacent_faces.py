@@ -9,8 +9,8 @@ from functools import lru_cache
 import numpy as np
 
 from ..arrays import Array, IntArray
-from ..spline.control_nets import ControlNets
 from ..spline.interface import Interface, axis_side
+from ..spline.spline_map import ControlNets
 
 Edges = tuple[IntArray, Array]  # the table of `next_faces`, and the side lengths (blocks, 3) of the blocks
 

@@ -20,7 +20,7 @@ import numpy as np
 from ..arrays import Array, IntArray
 from ..cube.cube import CORNERS, EDGES, face_number
 from ..spline.bspline import divided_spans
-from ..spline.control_nets import ControlNets
+from ..spline.spline_map import ControlNets
 from ..surface.nearest import nearest_on_mesh
 from .sliding import SlidingParameters
 from .surface_distance import TANGENTIAL, Correspondence

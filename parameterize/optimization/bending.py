@@ -12,7 +12,7 @@ from numpy.typing import DTypeLike
 
 from ..arrays import Array, Floats, Knots
 from ..spline.bspline import collocation, gauss_points
-from ..spline.control_nets import ControlNets
+from ..spline.spline_map import ControlNets
 from .operators import PiecewiseOperator
 from .tensor_product import Band, apply_band, band
 from .term import Blockwise, RoundWeights, side_by_side

@@ -17,7 +17,7 @@ import numpy as np
 from ..arrays import Array, Floats, IntArray, Knots, Mask
 from ..spline.bernstein import add_products, binomials, cross_products, extraction
 from ..spline.bspline import breakpoints
-from ..spline.control_nets import ControlNets
+from ..spline.spline_map import ControlNets
 from ..threads import in_parallel
 from .operators import PiecewiseOperator
 from .spans import numbers, with_neighbours

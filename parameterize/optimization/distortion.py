@@ -9,7 +9,7 @@ from scipy.ndimage import uniform_filter
 
 from ..arrays import Array, Floats, Knots
 from ..quality.rotations import closest_rotations
-from ..spline.control_nets import ControlNets
+from ..spline.spline_map import ControlNets
 from ..threads import in_parallel
 from .matrices import cofactors_and_determinants, dots, least_eigenvalues, squared_norms
 from .operators import PiecewiseOperator

@@ -12,8 +12,7 @@ import numpy as np
 from ..arrays import Array, Floats, IntArray
 from ..conjugate_gradients import conjugate_gradients
 from ..quality.distortion import own_boxes
-from ..spline.control_nets import ControlNets
-from ..spline.spline_map import SplineMap
+from ..spline.spline_map import ControlNets, SplineMap
 from .anchors import Anchors
 from .bending import Fairness
 from .contact import ContactPenalty, contact_penalty

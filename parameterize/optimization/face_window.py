@@ -7,7 +7,7 @@ import numpy as np
 
 from ..arrays import Array, IntArray, Mask
 from ..spline.bspline import basis_derivatives, breakpoints
-from ..spline.control_nets import ControlNets
+from ..spline.spline_map import ControlNets
 from ..threads import in_parallel
 from .operators import pieces
 

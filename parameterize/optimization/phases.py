@@ -13,8 +13,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from .certified_map import CertifiedMap
-from .endings import Reason
+from .endings import CertifiedMap, Reason
 from .newton import GAIN
 from .reassignment import reassign
 from .spans import acting_on, with_neighbours

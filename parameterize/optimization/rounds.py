@@ -18,8 +18,7 @@ from ..progress import History, Progress, ProgressCallback, ignore, timed
 from ..spline.bspline import open_uniform_knots
 from ..spline.spline_map import SplineMap
 from ..threads import one_blas_thread
-from .certified_map import CertifiedMap
-from .endings import Course, Reason
+from .endings import CertifiedMap, Course, Reason
 from .energy import SplineEnergy
 from .newton import FIRST_GAIN, Point, StoppingRule, descend
 from .phases import PATIENT_ROUNDS, RELAXING, Phase, Schedule

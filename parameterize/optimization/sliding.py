@@ -15,7 +15,7 @@ from ..arrays import Array, IntArray, Knots, Mask
 from ..cube.cube import axis_and_side, damped_solution, nearest_faces, tangent_axes
 from ..cube.flips import new_flips, unflip, untangle, untangle_whole
 from ..spline.bspline import breakpoints
-from ..spline.control_nets import ControlNets
+from ..spline.spline_map import ControlNets
 from ..threads import in_parallel
 from .adjacent_faces import Edges, next_faces
 from .face_window import FaceWindow, Polynomials, fill_tangents, fill_window

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..arrays import IntArray, Mask
 from ..spline.body import shared_numbers
-from ..spline.control_nets import ControlNets
+from ..spline.spline_map import ControlNets
 
 
 def in_blocks(spans: list[IntArray]) -> IntArray:

@@ -11,7 +11,7 @@ from ..arrays import Array, IntArray
 from ..checkpoint import Checkpoints
 from ..progress import History
 from ..spline.spline_map import SplineMap
-from .certified_map import CertifiedMap
+from .endings import CertifiedMap
 from .energy import SplineEnergy
 
 MOST_WATCHED = 1000  # spans: where more are unproved, the penalty at the Gauss points unfolds most first

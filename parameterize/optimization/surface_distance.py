@@ -8,7 +8,7 @@ normal only, on sharp edges across both sides, and at corners in all directions.
 import numpy as np
 
 from ..arrays import Array, Mask
-from ..spline.control_nets import ControlNets
+from ..spline.spline_map import ControlNets
 from ..surface.geometry import vertex_normals
 from .operators import PiecewiseOperator
 from .sliding import SlidingParameters

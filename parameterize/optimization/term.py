@@ -7,7 +7,7 @@ from itertools import islice
 from typing import Any, Generic, Protocol, TypeVar
 
 from ..arrays import Array, Floats
-from ..spline.control_nets import ControlNets
+from ..spline.spline_map import ControlNets
 from .operators import PiecewiseOperator
 
 

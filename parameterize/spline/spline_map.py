@@ -1,14 +1,123 @@
-"""SplineMap: a map of blocks as the optimization holds it, component by component."""
+"""Defines ControlNets, the control nets of blocks in one array, and SplineMap, the map that these give.
+
+A block is a cube that a spline maps into space. The optimization holds all blocks of a body together: control points
+(3, n), component first, block after block, each net in the order u, v, w. One cube is a body of one block.
+
+A span of a direction is the slab of a block between two neighbouring knots. An interface makes the slabs on both of its
+sides continue each other, so that a knot inserted into the one must be inserted into the other. A slab that comes back
+to its block through a loop of others, turned, is one with a slab of another direction there, or with its mirror image.
+"""
 
 from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 
-from ..arrays import Array, Knots
-from .body import Body
-from .bspline import greville, interpolate_grid
-from .control_nets import ControlNets
+from ..arrays import Array, Floats, IntArray, Knots, Mask
+from .body import Body, numbers_of_classes, shared_numbers
+from .bspline import breakpoints, greville, interpolate_grid
+from .interface import Interface, axis_side
 from .volume import BSplineVolume
+
+
+@dataclass(frozen=True, eq=False)
+class ControlNets:
+    """Describe the control nets of blocks: the degree in all directions, the knots of each block, their interfaces.
+
+    A cube's face has the number 2 * axis + side; a face of a body has the number 6 * block + face.
+    """
+
+    degree: int
+    knots: tuple[Knots, ...]
+    interfaces: tuple[Interface, ...] = ()
+
+    @property
+    def is_single(self) -> bool:
+        """Return whether the body is one block that is not glued to itself: the image of a cube."""
+        return len(self.knots) == 1 and not self.interfaces
+
+    @cached_property
+    def shapes(self) -> tuple[tuple[int, int, int], ...]:
+        """Return the numbers of control points (n_u, n_v, n_w) of each block."""
+        return tuple(tuple(len(row) - self.degree - 1 for row in knots) for knots in self.knots)  # type: ignore[misc]
+
+    @cached_property
+    def spans(self) -> tuple[tuple[int, int, int], ...]:
+        """Return the numbers of spans of each block in its three directions."""
+        return tuple(tuple(len(breakpoints(row)) - 1 for row in knots) for knots in self.knots)  # type: ignore[misc]
+
+    @cached_property
+    def starts(self) -> IntArray:
+        """Return the number of each block's first control point, and of control points in all, (blocks + 1,)."""
+        return np.cumsum([0, *(int(np.prod(shape)) for shape in self.shapes)])
+
+    @cached_property
+    def first_spans(self) -> IntArray:
+        """Return the number of each block's first span, and the number of all spans: (blocks + 1,)."""
+        return np.cumsum([0, *(int(np.prod(spans)) for spans in self.spans)])
+
+    def of_block(self, control: Floats, block: int) -> Floats:
+        """Return the control points (..., n_u, n_v, n_w) of a block, contiguous, from those of all blocks (..., n)."""
+        part = control[..., self.starts[block] : self.starts[block + 1]]
+        return np.ascontiguousarray(part).reshape(*control.shape[:-1], *self.shapes[block])
+
+    def joined(self, parts: list[Floats]) -> Floats:
+        """Return the control points (3, n) of all blocks from those of each block, (3, n_u, n_v, n_w)."""
+        return np.concatenate([part.reshape(3, -1) for part in parts], axis=1)
+
+    @cached_property
+    def _shared(self) -> tuple[IntArray, IntArray, Array]:
+        """Return the control points that interfaces make one with others, the group of each, and the groups' sizes."""
+        labels = np.concatenate([row.ravel() for row in shared_numbers(self.shapes, self.interfaces)[0]])
+        sizes = np.bincount(labels)
+        places = np.flatnonzero(sizes[labels] > 1)
+        _, groups = np.unique(labels[places], return_inverse=True)
+        return places, groups, np.bincount(groups).astype(np.float64)
+
+    def merged(self, control: Floats) -> Floats:
+        """Return values (..., n) of all control points, with their mean at control points that interfaces make one.
+
+        This is the orthogonal projection onto the values of continuous maps. The means of a group are equal bit by bit.
+        """
+        if not self.interfaces:
+            return control
+        places, groups, sizes = self._shared
+        merged = control.copy()
+        for row in merged.reshape(-1, control.shape[-1]):
+            row[places] = (np.bincount(groups, row[places]) / sizes)[groups]
+        return merged
+
+    def merged_mask(self, chosen: Mask) -> Mask:
+        """Return a mask (n,) of control points, with all those that interfaces make one with a chosen one."""
+        return np.asarray(self.merged(chosen.astype(np.float64)) > 0.0)
+
+    @cached_property
+    def exposed(self) -> Mask:
+        """Return whether each face of each block belongs to the body's boundary, (6 blocks,)."""
+        exposed = np.ones(6 * len(self.knots), dtype=bool)
+        for interface in self.interfaces:
+            for block, face in (interface.first, interface.second):
+                axis, side = axis_side(face)
+                exposed[6 * block + 2 * axis + side] = False
+        return exposed
+
+
+def tied_spans(nets: ControlNets) -> list[IntArray]:
+    """Return for each direction of each block, in the order u, v, w of block after block, the classes of its spans.
+
+    Spans that interfaces make one have the same class. Classes have the numbers from 0 on, in the order in which their
+    first spans come; without interfaces each span has its own.
+    """
+    starts = np.cumsum([0, *(count for counts in nets.spans for count in counts)])
+    rows = [np.arange(first, last) for first, last in pairwise(starts)]
+    pairs = [np.empty((2, 0), dtype=np.int64)]
+    for interface in nets.interfaces:
+        for a, b, flip in interface.directions:
+            row = rows[3 * interface.second[0] + b]
+            pairs.append(np.stack([rows[3 * interface.first[0] + a], row[::-1] if flip else row]))
+    classes = numbers_of_classes(int(starts[-1]), np.concatenate(pairs, axis=1))
+    return [classes[row] for row in rows]
 
 
 @dataclass(frozen=True, eq=False)

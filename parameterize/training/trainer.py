@@ -17,7 +17,7 @@ from torch import Tensor
 from ..arrays import Array, IntArray
 from ..checkpoint import Checkpoints
 from ..config import Config, StageConfig
-from ..cube.cube_layout import CubeLayout
+from ..cube.cube import CubeLayout
 from ..cube.edge_paths import PathError, choose_corners, cut_surface, edge_targets
 from ..cube.turning import best_turn, concavity
 from ..progress import History, Progress, ProgressCallback

@@ -24,8 +24,7 @@ from ..optimization.surface_distance import Correspondence
 from ..optimization.term import Weights
 from ..progress import timed
 from ..spline.bspline import greville, open_uniform_knots
-from ..spline.control_nets import ControlNets
-from ..spline.spline_map import SplineMap
+from ..spline.spline_map import ControlNets, SplineMap
 from ..surface.geometry import normals_and_areas
 from ..threads import one_blas_thread
 from .growth import GROWTH, STEPS, Grow

@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 from ..arrays import Knots
 from ..checkpoint import Checkpoints
 from ..config import Config, scaled_steps
-from ..cube.cube_layout import CubeLayout
+from ..cube.cube import CubeLayout
 from ..optimization.endings import Reason
 from ..optimization.phases import Phase, Polish, Schedule, Separate, Unfold
 from ..optimization.state import State

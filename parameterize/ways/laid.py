@@ -11,17 +11,15 @@ from numpy.typing import NDArray
 
 from ..checkpoint import Checkpoints
 from ..cube.boundary_map import on_faces
-from ..optimization.certified_map import CertifiedMap
-from ..optimization.endings import Course, Reason
+from ..optimization.endings import CertifiedMap, Course, Reason
 from ..optimization.sliding import SlidingParameters
 from ..optimization.surface_distance import Correspondence
 from ..optimization.term import Weights
 from ..progress import timed
 from ..quality.distances import nearest_on_boundary
-from ..spline.control_nets import ControlNets
 from ..spline.interface import Interface
 from ..spline.sampled_boundary import SampledBoundary
-from ..spline.spline_map import SplineMap
+from ..spline.spline_map import ControlNets, SplineMap
 from ..spline.volume import FACE_NAMES
 from ..threads import one_blas_thread
 from .cost import Cost

@@ -7,7 +7,7 @@ from dataclasses import replace
 from ..arrays import Array, IntArray
 from ..checkpoint import Checkpoints
 from ..config import SplineConfig
-from ..cube.cube_layout import CubeLayout
+from ..cube.cube import CubeLayout
 from ..cube.edge_paths import PathError, choose_corners, lay_out
 from ..cube.flips import flipped, untangle
 from ..optimization.phases import RAMP, Polish, Schedule, Separate, Shape, Unfold

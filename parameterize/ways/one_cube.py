@@ -7,8 +7,7 @@ from scipy.spatial.transform import Rotation
 
 from ..arrays import Array
 from ..cube.constrained import Constrained
-from ..cube.cube import CORNERS, project_radially, snap
-from ..cube.cube_layout import CubeLayout
+from ..cube.cube import CORNERS, CubeLayout, project_radially, snap
 from ..cube.cutting import cut_along_rays, subdivide_finely
 from ..cube.sphere import lay_on_sphere
 from ..cube.turning import best_turn
@@ -16,8 +15,7 @@ from ..optimization.least_squares import fit_pairs
 from ..optimization.rounds import coarse_knots
 from ..optimization.sliding import SlidingParameters
 from ..optimization.surface_distance import Correspondence
-from ..spline.control_nets import ControlNets
-from ..spline.spline_map import SplineMap
+from ..spline.spline_map import ControlNets, SplineMap
 from .task import MOST_POINTS, MappingTask
 from .way import Suits, Way
 

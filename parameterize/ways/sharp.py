@@ -12,8 +12,7 @@ from ..arrays import IntArray
 from ..checkpoint import Checkpoints
 from ..config import SplineConfig
 from ..cube.constrained import OFF_RIDGES, Constrained, choose_sharp_corners, constrained
-from ..cube.cube import snap
-from ..cube.cube_layout import CubeLayout
+from ..cube.cube import CubeLayout, snap
 from ..cube.edge_paths import PathError, lay_out
 from ..extension import extended
 from ..optimization.phases import Polish, Schedule, Separate, Shape, Unfold

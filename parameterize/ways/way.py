@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from ..checkpoint import Checkpoints
-from ..optimization.certified_map import CertifiedMap
-from ..optimization.endings import Course
+from ..optimization.endings import CertifiedMap, Course
 from ..optimization.phases import Schedule
 from ..optimization.reassignment import boundary_samples
 from ..optimization.rounds import optimize_coarse_first

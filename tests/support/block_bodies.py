@@ -9,9 +9,8 @@ from parameterize.optimization.reassignment import reassign
 from parameterize.optimization.sliding import SlidingParameters
 from parameterize.optimization.surface_distance import TANGENTIAL, Correspondence
 from parameterize.spline.bspline import greville, open_uniform_knots
-from parameterize.spline.control_nets import ControlNets
 from parameterize.spline.sampled_boundary import SampledBoundary
-from parameterize.spline.spline_map import SplineMap
+from parameterize.spline.spline_map import ControlNets, SplineMap
 from parameterize.surface.geometry import vertex_quadrics, vertex_weights
 
 TURNS = [

@@ -4,7 +4,7 @@ import numpy as np
 
 from parameterize.cube.cube import nearest_faces
 from parameterize.spline.bspline import greville, open_uniform_knots
-from parameterize.spline.control_nets import ControlNets
+from parameterize.spline.spline_map import ControlNets
 from parameterize.spline.volume import BSplineVolume
 from parameterize.training.target_shapes import nearest_places
 

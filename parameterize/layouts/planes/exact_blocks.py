@@ -10,7 +10,7 @@ from ...certificate.body import certify
 from ...certificate.boundary import check_boundary
 from ...spline.body import Body
 from ...spline.bspline import open_uniform_knots
-from ...spline.control_nets import ControlNets, tied_spans
+from ...spline.spline_map import ControlNets, tied_spans
 from ...spline.volume import FACE_NAMES
 from ...surface.geometry import normals_and_areas, signed_volume
 from ...surface.surface import Surface

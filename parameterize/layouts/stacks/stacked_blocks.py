@@ -9,8 +9,7 @@ from ...arrays import Array, IntArray
 from ...certificate.body import certify
 from ...certificate.boundary import check_boundary
 from ...spline.bspline import greville, open_uniform_knots
-from ...spline.control_nets import ControlNets
-from ...spline.spline_map import SplineMap
+from ...spline.spline_map import ControlNets, SplineMap
 from ...surface.features import SHARP
 from ..planes.exact_blocks import FEWEST_SPANS, MOST_BLOCKS, balanced_spans
 from ..rods.along_skeleton import Block, BlockLayout
