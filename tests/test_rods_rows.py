@@ -12,7 +12,7 @@ from parameterize.certificate.boundary import check_boundary
 from parameterize.layouts.rods import along_skeleton as layouts
 from parameterize.layouts.rods.along_skeleton import Block, BlockLayout, block_layout
 from parameterize.layouts.rods.rows import with_rows
-from parameterize.layouts.rods.strips import Crossing, Cuts, divided
+from parameterize.layouts.rods.strips import BlockCuts, Crossing, divided
 from parameterize.spline.body import Body
 from parameterize.surface.solid import Solid
 
@@ -109,7 +109,7 @@ def chain_of_cubes():
 def test_strips_go_on_through_glued_faces_and_turn_with_them():
     blocks = chain_of_cubes()
     interfaces = BlockLayout.from_blocks(blocks).interfaces
-    cuts = Cuts(1, np.array([[0.75, 0.25]]))  # across y, at a quarter
+    cuts = BlockCuts(1, np.array([[0.75, 0.25]]))  # across y, at a quarter
     strips, parents = divided(blocks, interfaces, [(0, cuts)])
     assert parents == [0, 0, 1, 1, 2, 2]
     assert [sorted({float(y) for y in strip.sections[..., 1].ravel()}) for strip in strips[:4]] == [
@@ -118,10 +118,10 @@ def test_strips_go_on_through_glued_faces_and_turn_with_them():
     ] * 2
     assert len(BlockLayout.from_blocks(strips).interfaces) == 4 + 3  # two along x for each strip, one between the two
     with pytest.raises(Crossing):
-        divided(blocks, interfaces, [(0, cuts), (1, Cuts(2, np.array([[0.5, 0.5]])))])
+        divided(blocks, interfaces, [(0, cuts), (1, BlockCuts(2, np.array([[0.5, 0.5]])))])
 
 
 def test_a_block_that_nothing_reaches_stays_whole():
     blocks = chain_of_cubes()
-    strips, _ = divided(blocks, BlockLayout.from_blocks(blocks).interfaces, [(0, Cuts(0, np.array([[0.5, 0.5]])))])
+    strips, _ = divided(blocks, BlockLayout.from_blocks(blocks).interfaces, [(0, BlockCuts(0, np.array([[0.5, 0.5]])))])
     assert [block.name for block in strips] == ["0, strip 0", "0, strip 1", "1", "2"]
