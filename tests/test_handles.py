@@ -9,8 +9,7 @@ from parameterize.layouts.rods.clearance import Clearance
 from parameterize.layouts.skeleton.solid import skeleton_of
 from parameterize.layouts.stubs.cutting import without_handles
 from parameterize.layouts.stubs.pieces import handles_of
-from parameterize.layouts.stubs.stub_blocks import ACROSS, footprint, stub_layout
-from parameterize.spline.body import Body as SplineBody
+from parameterize.layouts.stubs.stub_blocks import ACROSS, footprint, stub_blocks
 from parameterize.spline.volume import BSplineVolume
 from parameterize.surface.geometry import signed_volume
 from parameterize.surface.solid import Solid
@@ -62,12 +61,11 @@ def test_stubs_are_glued_to_whole_faces_and_the_body_stays_as_it_is(body):
         right = handle.curve[:, 0].mean() > 0.0
         places = [np.array([[float(right), 0.5 + x[1], 0.5]]) for x in (handle.curve[0], handle.curve[-1])]
         ends.append(tuple(footprint(place, np.array([int(right)]), spans) for place in places))
-    layout, parts = stub_layout(volume, ends, handles, Clearance(skeleton, Solid(vertices, faces)))
-    rods = layout.blocks[: len(layout.blocks) - len(parts)]
-    assert len(rods) == 2 and all(rod.spans[:2] == (ACROSS, ACROSS) for rod in rods)
-    glued = [face for one in layout.interfaces for face in (one.first, one.second)]
+    blocks, parts = stub_blocks(volume, ends, handles, Clearance(skeleton, Solid(vertices, faces)))
+    rods = blocks.spans[: len(blocks) - len(parts)]
+    assert len(rods) == 2 and np.all(rods[:, :2] == ACROSS)
+    glued = [face for one in blocks.interfaces for face in (one.first, one.second)]
     assert all((k, end) in glued for k in range(2) for end in ("w0", "w1"))
     corner = volume([[0.0, 0.0, 0.0]])[0]
     assert np.array_equal(parts[0]([[0.0, 0.0, 0.0]])[0], corner)
-    solid = SplineBody(tuple(block.spline for block in layout.blocks), layout.interfaces)
-    assert check_boundary(solid).injective is not False
+    assert check_boundary(blocks.body).injective is not False

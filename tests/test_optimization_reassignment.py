@@ -1,8 +1,7 @@
 import numpy as np
 import pytest
-from block_bodies import box, map_of, rod, sampled, straight_block, surface_fit
+from block_bodies import box, glued, map_of, rod, sampled, straight_block, surface_fit
 
-from parameterize.layouts.rods.along_skeleton import BlockLayout
 from parameterize.optimization.reassignment import reassign
 
 THICKNESS = 0.02
@@ -12,7 +11,7 @@ def plate(turn=0):
     """A thin plate of two blocks, whose two sides are far nearer to each other than samples on one side."""
     halves = [((0.0, 0.0, 0.0), (0.5, 1.0, THICKNESS)), ((0.5, 0.0, 0.0), (1.0, 1.0, THICKNESS))]
     corners = [box(*half) for half in halves]
-    return map_of(BlockLayout.from_blocks([straight_block(c, k * turn, 3) for k, c in enumerate(corners)]))
+    return map_of(glued(*[straight_block(c, k * turn, 3) for k, c in enumerate(corners)]))
 
 
 def normals_at(spline, places):

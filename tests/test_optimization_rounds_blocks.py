@@ -14,7 +14,6 @@ from parameterize.certificate.body import certify
 from parameterize.certificate.boundary import check_boundary
 from parameterize.checkpoint import Checkpoints
 from parameterize.config import SplineConfig
-from parameterize.layouts.rods.along_skeleton import BlockLayout
 from parameterize.optimization.energy import SplineEnergy
 from parameterize.optimization.phases import Polish, Schedule, Separate, Shape, Unfold
 from parameterize.optimization.rounds import optimize
@@ -28,9 +27,8 @@ SCHEDULE = Schedule((Shape(), Unfold(), Separate(), Polish(rounds=1)), rounds=6)
 @cache
 def torus_start():
     """A ring of four rods with few spans, and the surface's points and faces."""
-    layout, points, faces = torus(around=32, across=14)
-    blocks = [replace(block, spans=(3, 3, 4)) for block in layout.blocks]
-    return map_of(BlockLayout.from_blocks(blocks)), points, faces
+    blocks, points, faces = torus(around=32, across=14)
+    return map_of(blocks.with_spans((3, 3, 4))), points, faces
 
 
 def optimised(start, points, faces, schedule=SCHEDULE, steps=5, **options):
@@ -60,10 +58,10 @@ def test_a_torus_of_four_rods_is_certified_and_close():
 
 @pytest.mark.slow
 def test_a_double_torus_with_a_junction_is_certified_and_close():
-    layout, points, faces = double_torus(cells=60)
-    blocks = [replace(block, spans=(4, 4, 4 if block.name == "junction" else 14)) for block in layout.blocks]
+    blocks, points, faces = double_torus(cells=60)
+    blocks = blocks.with_spans([(4, 4, 4 if name == "junction" else 14) for name in blocks.names])
     schedule = replace(SCHEDULE, rounds=9)
-    found, _, _, distance = optimised(map_of(BlockLayout.from_blocks(blocks)), points, faces, schedule, steps=8)
+    found, _, _, distance = optimised(map_of(blocks), points, faces, schedule, steps=8)
     demand_certified(found)
     assert distance < 2e-3
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from plane_bodies import ring
 
-from parameterize.layouts.planes.quadrangles import LEAST, quadrangles_of
+from parameterize.layouts.planar.quadrangles import LEAST, quadrangles_of
 
 SQUARE = [(0.0, 0.0), (4.0, 0.0), (4.0, 4.0), (0.0, 4.0)]
 POLYGONS = {  # the outer polygon and those around holes, and the number of quadrangles

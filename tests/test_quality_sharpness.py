@@ -2,11 +2,10 @@
 
 import numpy as np
 import pytest
-from plane_bodies import arrays, exact_layout
+from plane_bodies import arrays, blocks_of
 from shapes import ball
 
 from parameterize.quality.sharpness import distance_to_edges, sharpness_of
-from parameterize.spline.body import Body
 from parameterize.spline.volume import BSplineVolume
 
 CUBE = BSplineVolume.uniform([[[[i, j, k] for k in (0, 1)] for j in (0, 1)] for i in (0, 1)], degree=1)
@@ -19,9 +18,7 @@ def test_points_have_their_distance_from_the_nearest_edge():
 
 def test_exact_blocks_keep_all_edges():
     vertices, faces = arrays("L")
-    layout = exact_layout(vertices, faces)
-    body = Body(tuple(block.spline for block in layout.blocks), layout.interfaces)
-    found = sharpness_of(body, vertices, faces)
+    found = sharpness_of(blocks_of(vertices, faces).body, vertices, faces)
     assert (found.edges, found.corners) == (18, 12) and found.length == pytest.approx(36.0)
     assert found.distance.max < 1e-12 and found.normals.max < 1e-5
 

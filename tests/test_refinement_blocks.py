@@ -1,6 +1,5 @@
 """Knots inserted into blocks: a ring of four rods in a torus."""
 
-from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -30,11 +29,10 @@ OPTIONS = {"tolerance": 1e-9, "max_control_points": 6}
 @cache
 def first():
     """A certified map of few spans, and the data of its surface: a torus whose height has eight waves around."""
-    layout, points, faces = torus(around=64, across=28)
+    blocks, points, faces = torus(around=64, across=28)
     x, y, z = (points - 0.5).T
     points[:, 2] += 0.15 * z * np.cos(8.0 * np.arctan2(y, x))
-    blocks = tuple(replace(block, spans=(2, 2, 2)) for block in layout.blocks)
-    start = map_of(replace(layout, blocks=blocks))
+    start = map_of(blocks.with_spans(2))
     fit = surface_fit(start, points, faces)
     found, _ = optimize(start, fit, CONFIG, SCHEDULE, history=History())
     assert not any(found.faults)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from parameterize.layouts.rods.assignment import NORMALS, assigned
+from parameterize.layouts.rods.splitting import NORMALS, assigned
 
 
 def around(*degrees):

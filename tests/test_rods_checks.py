@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from parameterize.layouts.rods.checks import folded
+from parameterize.layouts.rods.rods import folded
 
 SQUARE = np.array([[[0.0, 0.0, 0.0], [0.0, 1.0, 0.0]], [[1.0, 0.0, 0.0], [1.0, 1.0, 0.0]]])  # corners [u][v]
 UP = np.array([0.0, 0.0, 1.0])

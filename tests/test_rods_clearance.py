@@ -6,7 +6,7 @@ from shapes import CORNERS, CUBE_FACES
 
 from parameterize.layouts.rods.centering import centered
 from parameterize.layouts.rods.clearance import Clearance
-from parameterize.layouts.rods.rings import ring
+from parameterize.layouts.rods.rods import ring
 from parameterize.layouts.skeleton.graph import Branch, Skeleton
 from parameterize.surface.solid import Solid
 

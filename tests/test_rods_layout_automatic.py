@@ -8,9 +8,8 @@ from thick_graphs import curve, exposed_genus, genus, loop, thick
 
 from parameterize.certificate.body import certify
 from parameterize.certificate.boundary import check_boundary
-from parameterize.layouts.rods.along_skeleton import LayoutError, block_layout
+from parameterize.layouts.rods.along_skeleton import LayoutError, blocks_along
 from parameterize.layouts.skeleton.graph import Skeleton
-from parameterize.spline.body import Body
 from parameterize.surface.solid import Solid
 
 HUB, X, Y, Z = np.zeros(3), *np.eye(3)
@@ -52,27 +51,27 @@ GRAPHS = {
 @pytest.fixture(scope="module", params=GRAPHS, ids=lambda name: name.replace(" ", "_"))
 def start(request):
     skeleton, vertices, faces = thick(*GRAPHS[request.param], cells=60)  # fingers fuse on fewer
-    return block_layout(skeleton, vertices, faces), vertices, faces, skeleton
+    return blocks_along(skeleton, vertices, faces), vertices, faces, skeleton
 
 
 def test_a_start_is_right_handed_inside_the_body_and_of_its_genus(start):
-    layout, vertices, faces, skeleton = start
-    body = Body(tuple(block.spline for block in layout.blocks), layout.interfaces)
-    certificate = certify(body)
+    blocks, vertices, faces, skeleton = start
+    certificate = certify(blocks.body)
     assert certificate.verdict == "certified" and not any(patch.left_handed for patch in certificate.patches)
-    assert check_boundary(body).injective
-    assert Solid(vertices, faces).contains(layout.corners).all()
-    assert exposed_genus(layout) == genus(vertices, faces) == skeleton.handles
+    assert check_boundary(blocks.body).injective
+    assert Solid(vertices, faces).contains(blocks.points).all()
+    assert exposed_genus(blocks) == genus(vertices, faces) == skeleton.handles
 
 
 def test_limbs_end_in_their_tips(start):
-    layout, vertices, faces, skeleton = start
+    blocks, vertices, faces, skeleton = start
     tips = skeleton.nodes[np.array(skeleton.degrees) == 1]
-    closed = [(i, side) for i, free in enumerate(layout.exposed[:, 4:]) for side in (0, 1) if free[side]]
+    closed = [(i, side) for i, free in enumerate(blocks.exposed[:, 4:]) for side in (0, 1) if free[side]]
     rods = defaultdict(list)  # a rod may be cut into strips
     for i, side in closed:
-        if (name := layout.blocks[i].name).startswith("rod"):
-            rods[name.partition(", strip")[0], side].append(layout.blocks[i].face(f"w{side}").mean(axis=(0, 1)))
+        if (name := blocks.names[i]).startswith("rod"):
+            ends = blocks.points[blocks.hexahedra[i][:, :, side]]
+            rods[name.partition(", strip")[0], side].append(ends.mean(axis=(0, 1)))
     assert len(rods) == len(tips)
     for middles in rods.values():
         assert np.linalg.norm(tips - np.mean(middles, axis=0), axis=1).min() < 0.2
@@ -80,13 +79,13 @@ def test_limbs_end_in_their_tips(start):
 
 def test_a_point_is_refused():
     with pytest.raises(LayoutError, match="one cube serves such a body"):
-        block_layout(Skeleton(np.zeros((1, 3)), np.ones(1), (), 1.0, 0.04), np.zeros((0, 3)), np.zeros((0, 3), int))
+        blocks_along(Skeleton(np.zeros((1, 3)), np.ones(1), (), 1.0, 0.04), np.zeros((0, 3)), np.zeros((0, 3), int))
 
 
 def test_spans_follow_the_lengths():
     skeleton, vertices, faces = thick(*GRAPHS["limb on a circle"])
-    layout = block_layout(skeleton, vertices, faces, spans=5)
-    spans = {block.name: block.spans for block in layout.blocks}
+    blocks = blocks_along(skeleton, vertices, faces, spans=5)
+    spans = {name: tuple(row) for name, row in zip(blocks.names, blocks.spans.tolist(), strict=True)}
     assert spans["junction 0"] == (5, 5, 5)
     assert spans["rod 0"] == (5, 5, 20)  # more than eight times as long as wide: four times the spans across
     assert spans["rod 1"][:2] == (5, 5) and 5 <= spans["rod 1"][2] <= 8  # a sixth as long
@@ -95,4 +94,4 @@ def test_spans_follow_the_lengths():
 def test_a_skeleton_that_leaves_the_body_is_refused_with_the_place():
     skeleton, vertices, faces = thick(*GRAPHS["rod"])
     with pytest.raises(LayoutError, match=r"fits into the body: a .* near here; make the surface wider there"):
-        block_layout(skeleton, vertices + 0.25 * Z, faces, where=lambda place: "here")
+        blocks_along(skeleton, vertices + 0.25 * Z, faces, where=lambda place: "here")

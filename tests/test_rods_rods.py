@@ -6,8 +6,7 @@ from thick_graphs import curve, loop, thick
 
 from parameterize.layouts.rods.clearance import Clearance
 from parameterize.layouts.rods.frames import angle_about
-from parameterize.layouts.rods.rings import PARTS, ring
-from parameterize.layouts.rods.rods import ends_turned, rod
+from parameterize.layouts.rods.rods import PARTS, quarter_turns, ring, rod
 from parameterize.surface.solid import Solid
 
 X, Y, Z = np.eye(3)
@@ -28,7 +27,7 @@ def straight():
 def test_the_turn_between_two_faces_is_the_least_and_spread_out(straight):
     branch, room = straight
     first, last = SQUARE - 0.8 * Z, turned(SQUARE, np.radians(130.0)) + 0.8 * Z
-    last = ends_turned(first, last, branch.points)
+    last = np.rot90(last, quarter_turns(first, last, branch.points))
     found = rod(branch.points, branch.radii, (0.2, 1.8), first, last, room)
     sections = found.sections(np.ones(len(found.centers)))
     assert np.allclose(sections[0], first) and np.allclose(sections[-1], last)

@@ -4,16 +4,16 @@ from collections import Counter
 
 import numpy as np
 import pytest
+from block_bodies import glued
 from test_rods_layout_automatic import GRAPHS
 from thick_graphs import curve, exposed_genus, thick
 
 from parameterize.certificate.body import certify
 from parameterize.certificate.boundary import check_boundary
-from parameterize.layouts.rods import along_skeleton as layouts
-from parameterize.layouts.rods.along_skeleton import Block, BlockLayout, block_layout
+from parameterize.layouts.rods import along_skeleton
+from parameterize.layouts.rods.along_skeleton import blocks_along
 from parameterize.layouts.rods.rows import with_rows
-from parameterize.layouts.rods.strips import BlockCuts, Crossing, divided
-from parameterize.spline.body import Body
+from parameterize.layouts.rods.strips import BlockCuts, Crossing, cut_into_strips
 from parameterize.surface.solid import Solid
 
 X, Y, Z = np.eye(3)
@@ -69,19 +69,19 @@ def test_limbs_that_part_at_once_have_no_row(name):
 @pytest.mark.parametrize("others", [(ARM,), (ARM, THUMB)], ids=["arm", "arm_and_thumb"])
 def test_the_flat_part_is_cut_into_a_strip_for_each_finger(others):
     skeleton, vertices, faces = hand(*others)
-    layout = block_layout(skeleton, vertices, faces)
-    body = Body(tuple(block.spline for block in layout.blocks), layout.interfaces)
+    blocks = blocks_along(skeleton, vertices, faces)
+    body = blocks.body
     certificate = certify(body)
     assert certificate.verdict == "certified" and not any(patch.left_handed for patch in certificate.patches)
     assert check_boundary(body).injective
-    assert Solid(vertices, faces).contains(layout.corners).all()
-    assert exposed_genus(layout) == 0 and len(body.parts) == 1
-    strips = Counter(block.name.partition(", strip")[0] for block in layout.blocks)
+    assert Solid(vertices, faces).contains(blocks.points).all()
+    assert exposed_genus(blocks) == 0 and len(body.parts) == 1
+    strips = Counter(name.partition(", strip")[0] for name in blocks.names)
     assert set(strips.values()) <= {1, len(LATERAL)} and len(LATERAL) in strips.values()
-    fingers = [number for number, block in enumerate(layout.blocks) if block.points(np.array([0.5, 0.5, 1.0]))[0] > 1.5]
+    fingers = [k for k in range(len(blocks)) if blocks.straight(k)([[0.5, 0.5, 1.0]])[0, 0] > 1.5]
     neighbours = {
         q
-        for one in layout.interfaces
+        for one in blocks.interfaces
         for p, q in ((one.first[0], one.second[0]), (one.second[0], one.first[0]))
         if p in fingers
     }
@@ -94,34 +94,31 @@ def test_limbs_are_laid_without_a_row_where_its_strips_do_not_fit(monkeypatch):
 
     graph = GRAPHS["hand"]  # which has blocks without a row, too
     skeleton, vertices, faces = thick(*graph, cells=60)
-    assert any("strip" in block.name for block in block_layout(skeleton, vertices, faces).blocks)
-    monkeypatch.setattr(layouts, "divided", cross)
-    assert not any("strip" in block.name for block in block_layout(skeleton, vertices, faces).blocks)
+    assert any("strip" in name for name in blocks_along(skeleton, vertices, faces).names)
+    monkeypatch.setattr(along_skeleton, "cut_into_strips", cross)
+    assert not any("strip" in name for name in blocks_along(skeleton, vertices, faces).names)
 
 
 def chain_of_cubes():
     """Three unit cubes in a row along x; the last one is turned about x by a right angle."""
     cube = np.stack(np.meshgrid(*[[0.0, 1.0]] * 3, indexing="ij"), axis=-1).transpose(2, 0, 1, 3)  # [w][u][v]
     turned = np.stack([cube[..., 0] + 2.0, 1.0 - cube[..., 2], cube[..., 1]], axis=-1)
-    return [Block(str(k), one, (2, 2, 2)) for k, one in enumerate((cube, cube + X, turned))]
+    return glued(*((str(k), one, (2, 2, 2)) for k, one in enumerate((cube, cube + X, turned))))
 
 
 def test_strips_go_on_through_glued_faces_and_turn_with_them():
     blocks = chain_of_cubes()
-    interfaces = BlockLayout.from_blocks(blocks).interfaces
     cuts = BlockCuts(1, np.array([[0.75, 0.25]]))  # across y, at a quarter
-    strips, parents = divided(blocks, interfaces, [(0, cuts)])
-    assert parents == [0, 0, 1, 1, 2, 2]
-    assert [sorted({float(y) for y in strip.sections[..., 1].ravel()}) for strip in strips[:4]] == [
-        [0.0, 0.25],
-        [0.25, 1.0],
-    ] * 2
-    assert len(BlockLayout.from_blocks(strips).interfaces) == 4 + 3  # two along x for each strip, one between the two
+    strips, parents = cut_into_strips(blocks, [(0, cuts)])
+    assert parents.tolist() == [0, 0, 1, 1, 2, 2]
+    corners = strips.points[strips.hexahedra]
+    assert [sorted(set(strip[..., 1].ravel().tolist())) for strip in corners[:4]] == [[0.0, 0.25], [0.25, 1.0]] * 2
+    assert len(strips.interfaces) == 4 + 3  # two along x for each strip, one between the two
     with pytest.raises(Crossing):
-        divided(blocks, interfaces, [(0, cuts), (1, BlockCuts(2, np.array([[0.5, 0.5]])))])
+        cut_into_strips(blocks, [(0, cuts), (1, BlockCuts(2, np.array([[0.5, 0.5]])))])
 
 
 def test_a_block_that_nothing_reaches_stays_whole():
     blocks = chain_of_cubes()
-    strips, _ = divided(blocks, BlockLayout.from_blocks(blocks).interfaces, [(0, BlockCuts(0, np.array([[0.5, 0.5]])))])
-    assert [block.name for block in strips] == ["0, strip 0", "0, strip 1", "1", "2"]
+    strips, _ = cut_into_strips(blocks, [(0, BlockCuts(0, np.array([[0.5, 0.5]])))])
+    assert strips.names == ("0, strip 0", "0, strip 1", "1", "2")

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from parameterize.layouts.skeleton.contraction import MOST, contract, divide, drop_stubs
-from parameterize.layouts.skeleton.depth import Depth
+from parameterize.layouts.skeleton.lattice import Depth
 from parameterize.layouts.skeleton.web import Arc, Web
 
 MIDDLE = np.full(3, 20.0)

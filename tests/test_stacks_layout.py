@@ -8,7 +8,7 @@ from shapes import rounded_cube
 
 from parameterize.certificate.body import certify
 from parameterize.layouts.stacks.stack import stack_of
-from parameterize.layouts.stacks.stacked_blocks import columns_of
+from parameterize.layouts.stacks.stacked_blocks import stacked_blocks
 from parameterize.layouts.stacks.tapers import tapered_stack_of
 from parameterize.quality.distances import nearest_on_boundary, two_sided
 from parameterize.spline.sampled_boundary import SampledBoundary
@@ -57,16 +57,16 @@ BODIES = {  # what makes each body, the number of its blocks, and its exact volu
 def test_blocks_follow_the_outlines_of_a_stack(name):
     make, count, volume = BODIES[name]
     vertices, faces = arrays(make())
-    columns = columns_of(vertices, faces, 6, 3)
+    blocks = stacked_blocks(vertices, faces, 6, 3)
     diagonal = np.linalg.norm(np.ptp(vertices, axis=0))
-    assert len(columns) == count
-    body = columns.spline.body
+    assert len(blocks) == count
+    body = blocks.spline.body
     assert certify(body).verdict == "certified"
     distances = nearest_on_boundary(vertices, body, SampledBoundary.of(body))[2]
     assert distances.max() < 2e-5 * diagonal  # the vertices lie on the circles
     filled = _volume(body)
     assert abs(filled - volume) < 0.1 * abs(signed_volume(vertices, faces) - volume)  # of the round body
-    assert 1e-4 < columns.off < 1e-3
+    assert 1e-4 < blocks.off < 1e-3
 
 
 def _volume(body):
@@ -86,19 +86,19 @@ def test_finely_meshed_walls_have_the_same_profile():
 
 
 def test_a_polygon_of_many_corners_becomes_a_circle():
-    columns = columns_of(*arrays(prism(ring(80, 1.0), 1.0)), 6, 3)
-    assert len(columns) == 5 and columns.off < 4e-4
+    blocks = stacked_blocks(*arrays(prism(ring(80, 1.0), 1.0)), 6, 3)
+    assert len(blocks) == 5 and blocks.off < 4e-4
 
 
 def test_the_angle_of_sharp_edges_decides_what_a_corner_is():
     vertices, faces = arrays(prism(ring(12, 1.0), 1.0))  # turns of 30 degrees
-    assert columns_of(vertices, faces, 6, 3).off > 1e-3
-    assert columns_of(vertices, faces, 6, 3, sharp=20.0).off < 1e-12
+    assert stacked_blocks(vertices, faces, 6, 3).off > 1e-3
+    assert stacked_blocks(vertices, faces, 6, 3, sharp=20.0).off < 1e-12
 
 
 def test_the_number_of_blocks_binds():
     vertices, faces = arrays(BODIES["washer"][0]())
-    assert columns_of(vertices, faces, 6, 3, most=3) is None
+    assert stacked_blocks(vertices, faces, 6, 3, most=3) is None
 
 
 def test_other_bodies_are_no_stacks():
@@ -156,19 +156,19 @@ def test_sides_that_lean_are_followed(name):
     make, levels, volume = TAPERED[name]
     vertices, faces = arrays(make())
     assert stack_of(vertices, faces) is None and len(tapered_stack_of(vertices, faces).heights) == levels
-    columns = columns_of(vertices, faces, 6, 3)
+    blocks = stacked_blocks(vertices, faces, 6, 3)
     diagonal = np.linalg.norm(np.ptp(vertices, axis=0))
-    body = columns.spline.body
+    body = blocks.spline.body
     assert certify(body).verdict == "certified"
     found = two_sided(body, vertices, faces)
-    assert found.summary().max < 1.2 * columns.off * diagonal < 1e-3 * diagonal
+    assert found.summary().max < 1.2 * blocks.off * diagonal < 1e-3 * diagonal
     if volume is not None:
         assert abs(_volume(body) - volume) < 0.1 * abs(signed_volume(vertices, faces) - volume)
 
 
 def test_plane_sides_beside_a_leaning_hole_stay_plane():
     vertices, faces = arrays(TAPERED["countersink"][0]())
-    body = columns_of(vertices, faces, 6, 3).spline.body
+    body = stacked_blocks(vertices, faces, 6, 3).spline.body
     u, v, w = np.meshgrid(*[np.linspace(0.0, 1.0, 9)] * 3, indexing="ij")
     points = np.concatenate([patch(np.stack([u, v, w], axis=-1).reshape(-1, 3)) for patch in body.patches])
     for axis in range(3):

@@ -115,7 +115,7 @@ def test_where_no_blocks_fit_a_body_without_handles_one_cube_is_tried(monkeypatc
     def refused(_):
         raise LayoutError("too thin")
 
-    monkeypatch.setattr(blocks, "_layout", refused)
+    monkeypatch.setattr(blocks, "_blocks", refused)
     task, ways = task_of(), (BLOCKS, SHARP, *CUBES)
     assert BLOCKS.make(task, Checkpoints.none()) is None
     assert Tried(BLOCKS, None, {}).report().ending == "no blocks fit"

@@ -20,8 +20,8 @@ from iga_nn.cli.commands import main
 from iga_nn.report import document as report
 from iga_nn.workflow.cost_estimate import Forecast, available_memory_mb, forecast
 from parameterize.config import preset
-from parameterize.layouts.planes import exact_blocks as layout
-from parameterize.layouts.planes.prisms import columns
+from parameterize.layouts.planes import exact_blocks as planes
+from parameterize.layouts.planes.prisms import prisms
 from parameterize.surface.surface import surface_from_arrays
 from parameterize.ways import network
 
@@ -102,7 +102,7 @@ def test_a_time_is_told_for_one_cube(mesh, config):
 
 def test_the_decomposition_of_the_estimate_is_that_of_the_run(monkeypatch):
     asked = []
-    monkeypatch.setattr(layout, "columns", lambda body: asked.append(body) or columns(body))
+    monkeypatch.setattr(planes, "prisms", lambda body: asked.append(body) or prisms(body))
     surface, quick = iga_nn.sample("cube"), preset("fast").with_control_points(8)
     forecast(surface, quick, device=CPU)
     assert len(iga_nn.parameterize(surface, quick).attempts) == len(asked) == 1

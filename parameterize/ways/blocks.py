@@ -11,11 +11,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..arrays import Array, Knots
 from ..checkpoint import Checkpoints
 from ..config import Config, scaled_steps
 from ..cube.cutting import subdivide_finely
-from ..layouts.rods.along_skeleton import Block, BlockLayout, LayoutError, block_layout
+from ..layouts.complex import Complex, spline_of
+from ..layouts.rods.along_skeleton import LayoutError, blocks_along
 from ..layouts.skeleton.graph import Skeleton, SkeletonError
 from ..optimization.phases import Polish, Schedule, Separate, Unfold
 from ..optimization.reassignment import reassign
@@ -23,8 +23,7 @@ from ..optimization.sliding import SlidingParameters
 from ..optimization.surface_distance import Correspondence
 from ..optimization.term import Weights
 from ..progress import timed
-from ..spline.bspline import greville, open_uniform_knots
-from ..spline.spline_map import ControlNets, SplineMap
+from ..spline.spline_map import SplineMap
 from ..surface.geometry import normals_and_areas
 from ..threads import one_blas_thread
 from .growth import GROWTH, STEPS, Grow
@@ -87,7 +86,7 @@ class AlongSkeleton(Way):
         needed = task.surface.genus > 0 or task.config.blocks is not None
         with timed(task.seconds, "fit"), one_blas_thread():
             try:
-                first = kept_blocks(checkpoints, lambda: thin_blocks(_layout(task), task.config.spline.degree))
+                first = kept_blocks(checkpoints, lambda: spline_of(_blocks(task), task.config.spline.degree))
             except LayoutError as error:
                 if needed:
                     raise
@@ -138,13 +137,13 @@ def _compactness(task: MappingTask) -> float:
     return area**3 / (36.0 * math.pi)
 
 
-def _layout(task: MappingTask) -> BlockLayout:
+def _blocks(task: MappingTask) -> Complex:
     """Return thin blocks along the skeleton. Raises SkeletonError and LayoutError if there are none."""
     surface, most = task.surface, task.config.blocks
-    layout = block_layout(task.skeleton, surface.unit_vertices, surface.faces, task.spans_across, task.in_users_units)
-    if most is not None and len(layout) > most:
-        raise LayoutError(f"the skeleton needs {len(layout)} blocks, and at most {most} are allowed: allow more")
-    return layout
+    blocks = blocks_along(task.skeleton, surface.unit_vertices, surface.faces, task.spans_across, task.in_users_units)
+    if most is not None and len(blocks) > most:
+        raise LayoutError(f"the skeleton needs {len(blocks)} blocks, and at most {most} are allowed: allow more")
+    return blocks
 
 
 def softened(stiff: Attempt, task: MappingTask, checkpoints: Checkpoints) -> Attempt:
@@ -176,25 +175,6 @@ def schedule(
     growing = Approach(shares=face_shares, steps=steps), Grow(shares=shares, steps=steps)
     phases = *growing, Unfold(far=_FAR, far_first=_FAR), Separate(far=_FAR), Polish()
     return Schedule(phases, len(shares) + config.spline.rounds + MORE_ROUNDS)
-
-
-def thin_blocks(layout: BlockLayout, degree: int) -> SplineMap:
-    """Return the map whose control points are points of the layout's rods, at the Greville points of uniform knots."""
-    nets = nets_of(layout, degree)
-    points = [points_of(block, rows, degree) for block, rows in zip(layout.blocks, nets.knots, strict=True)]
-    return SplineMap(nets, nets.merged(nets.joined(points)))
-
-
-def nets_of(layout: BlockLayout, degree: int) -> ControlNets:
-    """Return the control nets of a layout's blocks, with uniform knots."""
-    knots = [tuple(open_uniform_knots(degree + spans, degree) for spans in block.spans) for block in layout.blocks]
-    return ControlNets(degree, tuple(knots), layout.interfaces)  # type: ignore[arg-type]
-
-
-def points_of(block: Block, knots: Knots, degree: int) -> Array:
-    """Return the points (3, n_u, n_v, n_w) of a block at the Greville points of its knots."""
-    places = np.stack(np.meshgrid(*(greville(row, degree) for row in knots), indexing="ij"), axis=-1)
-    return np.moveaxis(block.points(places), -1, 0)
 
 
 def surface_fit(task: MappingTask, first: SplineMap) -> Correspondence:

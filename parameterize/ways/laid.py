@@ -42,7 +42,7 @@ class Laid(Way):
         """Return the attempt whose map is left as it is laid, which a checkpoint keeps."""
         with timed(task.seconds, "fit"), one_blas_thread():
             first = kept_blocks(checkpoints, lambda: self.lay(task))
-            fit = _surface_fit(task, first)
+            fit = _correspondence(task, first)
         with timed(task.seconds, "optimize"), one_blas_thread():
             laid = CertifiedMap.of(first)
         return Attempt(laid, Course(Counter(), {}, self.why), fit, Weights())
@@ -62,7 +62,7 @@ def in_words(count: int, noun: str) -> str:
     return f"{count} {noun}{'s' * (count > 1)}"
 
 
-def _surface_fit(task: MappingTask, first: SplineMap) -> Correspondence:
+def _correspondence(task: MappingTask, first: SplineMap) -> Correspondence:
     """Return the surface's vertices with their places on the blocks, in double precision."""
     points, faces = task.surface.to_unit(task.surface.vertices), task.surface.faces
     body = first.body

@@ -4,13 +4,11 @@ The blocks are trilinear, and a spline of any degree has them exactly. Each face
 blocks, and each of its edges of edges of blocks.
 """
 
-from dataclasses import replace
-
-from ..layouts.planes.exact_blocks import division_of, layout_of
-from ..layouts.rods.along_skeleton import BlockLayout
+from ..layouts.complex import Complex, spline_of
+from ..layouts.planes.exact_blocks import exact_blocks, with_spans_across
 from ..optimization.endings import Reason
 from ..spline.spline_map import SplineMap
-from .blocks import thin_blocks
+from ..threads import one_blas_thread
 from .laid import Laid, in_words
 from .task import MappingTask
 from .way import Suits
@@ -24,30 +22,33 @@ class BoundedByPlanes(Laid):
 
     def suits(self, task: MappingTask) -> Suits:
         """Return whether planes bound the body, and divide it into few enough hexahedra."""
-        layout = _exact_blocks(task)
-        return (
-            Suits(False)
-            if layout is None
-            else Suits(True, f"bounded by planes: {in_words(len(layout), 'exact block')}")
-        )
+        blocks = _exact_blocks(task)
+        if blocks is None:
+            return Suits(False)
+        return Suits(True, f"bounded by planes: {in_words(len(blocks), 'exact block')}")
 
     def lay(self, task: MappingTask) -> SplineMap:
         """Return the map of exact blocks at volume 1."""
-        layout = _exact_blocks(task)
-        assert layout is not None, "the way suits the body"
-        return thin_blocks(layout, task.config.spline.degree)
+        blocks = _exact_blocks(task)
+        assert blocks is not None, "the way suits the body"
+        return spline_of(blocks, task.config.spline.degree)
 
 
 PLANES = BoundedByPlanes("planes", "laying exact blocks along the planes")
 
 
-def _exact_blocks(task: MappingTask) -> BlockLayout | None:
+def _exact_blocks(task: MappingTask) -> Complex | None:
     """Return exact blocks of a body that planes bound, at volume 1; None for others, and for given corners."""
-    spline = task.config.spline
-    if task.given_corners is not None or (hexahedra := division_of(task.surface, task.config.blocks)) is None:
+    surface, spline, most = task.surface, task.config.spline, task.config.blocks
+    if task.given_corners is not None or len(surface.crossings):
         return None
-    layout = layout_of(hexahedra, task.spans_across)
-    if len(layout) > 1:
-        return layout
-    spans = spline.control_points - spline.degree
-    return BlockLayout((replace(layout.blocks[0], spans=(spans, spans, spans)),), ())
+
+    def find() -> Complex | None:
+        with one_blas_thread():
+            return exact_blocks(surface.to_unit(surface.vertices), surface.faces, most)
+
+    if (blocks := task.fact(("planes", most), find)) is None:
+        return None
+    if len(blocks) > 1:
+        return with_spans_across(blocks, task.spans_across)
+    return blocks.with_spans(spline.control_points - spline.degree)

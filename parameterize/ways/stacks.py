@@ -1,6 +1,6 @@
 """The way to blocks over the profiles of a stack of extrusions, which are left as they are."""
 
-from ..layouts.stacks.stacked_blocks import Columns, columns_of
+from ..layouts.stacks.stacked_blocks import StackedBlocks, stacked_blocks
 from ..optimization.endings import Reason
 from ..spline.spline_map import SplineMap
 from .laid import Laid, in_words
@@ -32,14 +32,14 @@ class StackOfExtrusions(Laid):
 STACKS = StackOfExtrusions("stacks", "laying blocks along the outlines of extrusions")
 
 
-def _stacked_blocks(task: MappingTask) -> Columns | None:
+def _stacked_blocks(task: MappingTask) -> StackedBlocks | None:
     """Return blocks of a stack of extrusions, at volume 1; None for other bodies, and for given corners."""
     surface, most = task.surface, task.config.blocks
     if task.given_corners is not None or len(surface.crossings):
         return None
     options = task.spans_across, task.config.spline.degree, most, surface.sharp
 
-    def find() -> Columns | None:
-        return columns_of(surface.to_unit(surface.vertices), surface.faces, *options)
+    def find() -> StackedBlocks | None:
+        return stacked_blocks(surface.to_unit(surface.vertices), surface.faces, *options)
 
     return task.fact(("stacks", *options), find)

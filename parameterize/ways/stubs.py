@@ -10,13 +10,14 @@ from dataclasses import replace
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ..arrays import Array, IntArray, Knots
+from ..arrays import Array, IntArray
 from ..checkpoint import Checkpoints
-from ..layouts.rods.along_skeleton import BlockLayout, LayoutError
+from ..layouts.complex import Complex, control_points
+from ..layouts.rods.along_skeleton import LayoutError
 from ..layouts.rods.clearance import Clearance
 from ..layouts.stubs.cutting import without_handles
 from ..layouts.stubs.pieces import Handle, handles_of
-from ..layouts.stubs.stub_blocks import Footprint, footprint, stub_layout
+from ..layouts.stubs.stub_blocks import Footprint, footprint, stub_blocks
 from ..optimization.endings import Course
 from ..optimization.reassignment import boundary_samples
 from ..progress import timed
@@ -28,7 +29,7 @@ from ..surface.errors import MeshError
 from ..surface.solid import Solid
 from ..surface.surface import surface_from_arrays
 from ..threads import one_blas_thread
-from .blocks import BLOCKS, STIFF_WEIGHTS, TUBE_OF_HANDLES, nets_of, points_of, schedule, softened, surface_fit
+from .blocks import BLOCKS, STIFF_WEIGHTS, TUBE_OF_HANDLES, schedule, softened, surface_fit
 from .growth import GROWTH
 from .laid import in_words
 from .task import MOST_POINTS, MappingTask
@@ -120,10 +121,10 @@ def _with_stubs(task: MappingTask, body: SplineMap, rims: list[tuple[Array, Arra
     surface, most = task.surface, task.config.blocks
     ends = [(_footprint(body, first), _footprint(body, last)) for first, last in rims]
     room = Clearance(task.skeleton, Solid(surface.unit_vertices, surface.faces))
-    layout, parts = stub_layout(body.volume, ends, _handles(task), room)
-    if most is not None and len(layout) > most:
-        raise LayoutError(f"a body with stubs needs {len(layout)} blocks, and at most {most} are allowed: allow more")
-    return _first(layout, parts, task.config.spline.degree)
+    blocks, parts = stub_blocks(body.volume, ends, _handles(task), room)
+    if most is not None and len(blocks) > most:
+        raise LayoutError(f"a body with stubs needs {len(blocks)} blocks, and at most {most} are allowed: allow more")
+    return _first(blocks, parts, task.config.spline.degree)
 
 
 def _footprint(body: SplineMap, rim: Array) -> Footprint:
@@ -133,22 +134,22 @@ def _footprint(body: SplineMap, rim: Array) -> Footprint:
     return footprint(samples.parameters[nearest], samples.faces[nearest], body.nets.spans[0][0])
 
 
-def _first(layout: BlockLayout, parts: tuple[BSplineVolume, ...], degree: int) -> SplineMap:
+def _first(blocks: Complex, parts: tuple[BSplineVolume, ...], degree: int) -> SplineMap:
     """Return the map of all blocks: rods whose ends lie on the body, and the parts of the body's map."""
-    nets, count = nets_of(layout, degree), len(layout) - len(parts)
-    points = [_on_body(number, layout, nets.knots[number], parts, degree) for number in range(count)]
+    nets = blocks.nets(degree)
+    points = [_on_body(number, blocks, parts, degree) for number in range(len(blocks) - len(parts))]
     points += [part.control_points for part in parts]
     return SplineMap(nets, nets.merged(nets.joined([np.moveaxis(net, -1, 0) for net in points])))
 
 
-def _on_body(number: int, layout: BlockLayout, knots: Knots, parts: tuple[BSplineVolume, ...], degree: int) -> Array:
+def _on_body(number: int, blocks: Complex, parts: tuple[BSplineVolume, ...], degree: int) -> Array:
     """Return the control points (n_u, n_v, n_w, 3) of a rod whose ends are the faces of the body's blocks below."""
-    along = greville(knots[2], degree)
-    points = np.moveaxis(points_of(layout.blocks[number], knots, degree), 0, -1)
-    for interface in layout.interfaces:
+    points = control_points(blocks, number, degree)
+    along = greville(blocks.nets(degree).knots[number][2], degree)
+    for interface in blocks.interfaces:
         (own, face), (other, below) = interface.first, interface.second
         if own == number:
-            body = parts[other - len(layout) + len(parts)].control_points
+            body = parts[other - len(blocks) + len(parts)].control_points
             away = interface.turned(face_layer(body, below)) - face_layer(points, face)
             share = np.maximum(0.0, 1.0 - 2.0 * (along if face == "w0" else 1.0 - along))
             points = points + share[:, None] * away[:, :, None]

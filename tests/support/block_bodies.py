@@ -4,13 +4,13 @@ from itertools import permutations, product
 
 import numpy as np
 
-from parameterize.layouts.rods.along_skeleton import Block, BlockLayout
+from parameterize.layouts.complex import Complex, spline_of
 from parameterize.optimization.reassignment import reassign
 from parameterize.optimization.sliding import SlidingParameters
 from parameterize.optimization.surface_distance import TANGENTIAL, Correspondence
-from parameterize.spline.bspline import greville, open_uniform_knots
+from parameterize.spline.bspline import open_uniform_knots
 from parameterize.spline.sampled_boundary import SampledBoundary
-from parameterize.spline.spline_map import ControlNets, SplineMap
+from parameterize.spline.spline_map import ControlNets
 from parameterize.surface.geometry import vertex_quadrics, vertex_weights
 
 TURNS = [
@@ -26,14 +26,22 @@ def uniform_nets(*spans, interfaces=(), degree=3):
     return ControlNets(degree, knots, tuple(interfaces))
 
 
-def map_of(layout):
-    """The map of degree 3 with control points in a layout's blocks, and equal to these where they are straight."""
-    nets = uniform_nets(*(block.spans for block in layout.blocks), interfaces=layout.interfaces)
-    parts = []
-    for block, knots in zip(layout.blocks, nets.knots, strict=True):
-        places = np.stack(np.meshgrid(*(greville(row, 3) for row in knots), indexing="ij"), axis=-1)
-        parts.append(np.moveaxis(block.points(places), -1, 0))
-    return SplineMap(nets, nets.merged(nets.joined(parts)))
+def glued(*blocks):
+    """Blocks by name, corners [u][v] of sections (m, 2, 2, 3) along w, and spans, glued where corners are equal."""
+    numbers, sections = {}, {}
+    for name, corners, _ in blocks:
+        rows = np.reshape(corners, (-1, 3))
+        own = [numbers.setdefault((row + 0.0).tobytes(), len(numbers)) for row in rows]
+        sections[name if name not in sections else f"{name}, {len(sections)}"] = np.moveaxis(
+            np.reshape(own, (len(corners), 2, 2)), 0, -1
+        )
+    points = np.array([np.frombuffer(row) for row in numbers])
+    return Complex.of(points, sections, [spans for *_, spans in blocks])
+
+
+def map_of(blocks):
+    """The map of degree 3 with control points in blocks, and equal to these where they are straight."""
+    return spline_of(blocks, 3)
 
 
 def wavy(spline, amplitude, seed=0):
@@ -63,7 +71,7 @@ def straight_block(corners, turn=0, spans=3):
     """The block over corners [u][v][w], (2, 2, 2, 3), with its directions turned by one of 24 rotations."""
     axes, signs = TURNS[turn % len(TURNS)]
     turned = np.asarray(corners, dtype=float).transpose(*axes, 3)[tuple(slice(None, None, s) for s in signs)]
-    return Block(f"turn {turn}", np.moveaxis(turned, 2, 0), (spans,) * 3)
+    return f"turn {turn}", np.moveaxis(turned, 2, 0), (spans,) * 3
 
 
 def box(low, high):
@@ -76,7 +84,7 @@ def rod(turn=0, lengths=(1.0, 2.0), spans=3):
     ends = np.cumsum([0.0, *lengths])
     pairs = enumerate(zip(ends[:-1], ends[1:], strict=True))
     boxes = [straight_block(box((a, 0.0, 0.0), (b, 0.5, 0.8)), k * turn, spans) for k, (a, b) in pairs]
-    return map_of(BlockLayout.from_blocks(boxes))
+    return map_of(glued(*boxes))
 
 
 def fan(count, turn=0, spans=3, angle=300.0):
@@ -88,7 +96,7 @@ def fan(count, turn=0, spans=3, angle=300.0):
         plane = np.array([[[0.0, 0.0], following], [ray, middle]])  # [u][v]
         corners = np.stack([np.concatenate([plane, np.full((2, 2, 1), z)], axis=-1) for z in (0.0, 2.0)], axis=2)
         blocks.append(straight_block(corners, k * turn, spans))
-    return map_of(BlockLayout.from_blocks(blocks))
+    return map_of(glued(*blocks))
 
 
 def ring(turn=0, count=5, spans=3):
@@ -98,7 +106,7 @@ def ring(turn=0, count=5, spans=3):
         angles = 2.0 * np.pi * np.array([k, (k + 1) % count]) / count
         corners = [[[[r * np.cos(a), r * np.sin(a), z] for z in (0.0, 0.6)] for a in angles] for r in (0.7, 1.4)]
         blocks.append(straight_block(corners, k * turn, spans))
-    return map_of(BlockLayout.from_blocks(blocks))
+    return map_of(glued(*blocks))
 
 
 BODIES = {

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pyvista
+from block_bodies import glued
 
-from parameterize.layouts.rods.along_skeleton import Block, BlockLayout
 from parameterize.surface.geometry import signed_volume
 
 SECTIONS = 13  # of a quarter of the torus; of each handle of the double torus twice as many
@@ -32,8 +32,8 @@ def torus(major=1.0, minor=0.35, around=72, across=28):
     )
     sections[-1] = sections[0]
     quarters = [sections[k * (SECTIONS - 1) : (k + 1) * (SECTIONS - 1) + 1] for k in range(4)]
-    blocks = [Block(f"rod {k}", scale * quarter + 0.5, (SPANS, SPANS, 8)) for k, quarter in enumerate(quarters)]
-    return BlockLayout.from_blocks(blocks), scale * points + 0.5, faces
+    blocks = [(f"rod {k}", scale * quarter + 0.5, (SPANS, SPANS, 8)) for k, quarter in enumerate(quarters)]
+    return glued(*blocks), scale * points + 0.5, faces
 
 
 def double_torus(cells=100):
@@ -60,10 +60,10 @@ def double_torus(cells=100):
     def block(name, plane, along):
         z = np.broadcast_to(np.array([-high, high])[:, None], (*plane.shape[:2], 2, 1))
         sections = np.concatenate([np.repeat(plane[:, :, None], 2, axis=2), z], axis=-1)
-        return Block(name, scale * sections + 0.5, (SPANS, SPANS, along))
+        return name, scale * sections + 0.5, (SPANS, SPANS, along)
 
     blocks = [block("left", left, 20), block("junction", middle, SPANS), block("right", right, 20)]
-    return BlockLayout.from_blocks(blocks), scale * points + 0.5, faces
+    return glued(*blocks), scale * points + 0.5, faces
 
 
 def _polar(x, radius, angle):

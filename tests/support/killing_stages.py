@@ -70,10 +70,10 @@ STAGES = (
     Stage("pillow", FOUR, "spline-1-coarse", 3, (*SPHERE, (sphere, "_stepped"))),
     Stage("pillow", FOUR, "spline-1", 1, (*SPHERE, (sphere, "_stepped"))),
     Stage("drum", FOUR.with_blocks(1), "sphere", 2, SPHERE),
-    Stage("L", TINY, "first", 1, ((planes, "layout_of"),)),
-    Stage("shaft", TINY, "first", 1, ((stacks, "columns_of"),)),
-    Stage("ring", TINY, "first", 1, ((blocks, "block_layout"), (task, "skeleton_of"))),
-    Stage("ring", TINY, "spline", 2, ((blocks, "block_layout"), (task, "skeleton_of"))),
+    Stage("L", TINY, "first", 1, ((planes, "exact_blocks"),)),
+    Stage("shaft", TINY, "first", 1, ((stacks, "stacked_blocks"),)),
+    Stage("ring", TINY, "first", 1, ((blocks, "blocks_along"), (task, "skeleton_of"))),
+    Stage("ring", TINY, "spline", 2, ((blocks, "blocks_along"), (task, "skeleton_of"))),
 )
 save = Checkpoints.save
 

@@ -3,7 +3,7 @@
 import numpy as np
 from manifold3d import CrossSection, Manifold
 
-from parameterize.layouts.planes.exact_blocks import hexahedra_of, layout_of
+from parameterize.layouts.planes.exact_blocks import exact_blocks, with_spans_across
 
 
 def box(low, high):
@@ -47,10 +47,10 @@ def arrays(body):
     return np.asarray(mesh.vert_properties)[:, :3], np.asarray(mesh.tri_verts, dtype=np.int64)
 
 
-def exact_layout(vertices, faces, most=None):
+def blocks_of(vertices, faces, most=None):
     """The exact blocks of a body, six spans across a cube; None where it has none."""
-    found = hexahedra_of(vertices, faces, most)
-    return None if found is None else layout_of(found, 6)
+    blocks = exact_blocks(vertices, faces, most)
+    return None if blocks is None else with_spans_across(blocks, 6)
 
 
 L = [(0, 0), (3, 0), (3, 1), (1, 1), (1, 3), (0, 3)]

@@ -54,14 +54,14 @@ def genus(vertices, faces):
     return 1 - (len(vertices) - len(edge_table(faces)[0]) + len(faces)) // 2
 
 
-def exposed_genus(layout):
+def exposed_genus(blocks):
     """The genus of the surface that the exposed faces make up; it is closed: two of them meet at each of its edges.
 
     Each block is a lattice of three points a direction: an edge has its middle point.
     """
-    numbers, _ = shared_numbers([(3, 3, 3)] * len(layout), layout.interfaces)
+    numbers, _ = shared_numbers([(3, 3, 3)] * len(blocks), blocks.interfaces)
     corners, edges, count = set(), Counter(), 0
-    for block, free in zip(numbers, layout.exposed, strict=True):
+    for block, free in zip(numbers, blocks.exposed, strict=True):
         for name in np.array(FACE_NAMES)[free]:
             net = face_layer(block, str(name))
             corners.update(net[::2, ::2].ravel().tolist())

@@ -1,55 +1,37 @@
-"""Hexahedra: cells with eight corners each, glued by whole faces, and how good they are."""
+"""Makes hexahedra of convex cells, and says how good they are."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from functools import cached_property
 from itertools import permutations, product
 
 import numpy as np
 
 from ...arrays import Array, IntArray
+from ..complex import Complex
 from .sheets import ConvexCell
 
 
-@dataclass(frozen=True, eq=False)
-class Hexahedra:
-    """Trilinear images of the cube with common corners.
+def quality(blocks: Complex) -> float:
+    """Return the smallest quality of any hexahedron: 1 for a box, 0 and below for one with a fold at a corner.
 
-    Attributes
-    ----------
-    points : (n, 3) array
-    corners : (k, 2, 2, 2) array of int
-        The points [u][v][w] of each; (u, v, w) is right-handed.
+    It is the smallest scaled Jacobian at a corner, times the cube root of the ratio of det J at its corners, as one
+    that ends in a sliver is no better than one with a flat corner.
     """
+    dets, scaled = _jacobians(blocks.points[blocks.hexahedra])
+    ratios = dets.min(axis=1) / np.maximum(np.abs(dets).max(axis=1), 1e-300)
+    return float((scaled.min(axis=1) * np.cbrt(np.maximum(ratios, 0.0))).min())
 
-    points: Array
-    corners: IntArray
 
-    def __len__(self) -> int:
-        return len(self.corners)
+def cost(blocks: Complex) -> float:
+    """Return the number of hexahedra over the square of their quality, by which decompositions are compared.
 
-    @cached_property
-    def quality(self) -> float:
-        """Return the smallest quality of any: 1 for a box, 0 and below for one with a fold at a corner.
+    So an L becomes three boxes rather than two blocks with a mitre.
+    """
+    return len(blocks) / max(quality(blocks), 1e-300) ** 2
 
-        It is the smallest scaled Jacobian at a corner, times the cube root of the ratio of det J at its corners, as one
-        that ends in a sliver is no better than one with a flat corner.
-        """
-        dets, scaled = _jacobians(self.points[self.corners])
-        ratios = dets.min(axis=1) / np.maximum(np.abs(dets).max(axis=1), 1e-300)
-        return float((scaled.min(axis=1) * np.cbrt(np.maximum(ratios, 0.0))).min())
 
-    @property
-    def cost(self) -> float:
-        """Return the number of hexahedra over the square of their quality, by which divisions are compared.
-
-        So an L becomes three boxes rather than two blocks with a mitre.
-        """
-        return len(self) / max(self.quality, 1e-300) ** 2
-
-    def turned(self) -> "Hexahedra":
-        """Return the same hexahedra, each with u, v and w along x, y and z as far as possible."""
-        return Hexahedra(self.points, np.array([_turned(self.points, one) for one in self.corners]))
+def along_axes(blocks: Complex) -> Complex:
+    """Return the same hexahedra, each with u, v and w along x, y and z as far as possible."""
+    return Complex(blocks.points, np.array([_turned(blocks.points, one) for one in blocks.hexahedra]))
 
 
 def _jacobians(corners: Array) -> tuple[Array, Array]:
@@ -72,14 +54,13 @@ def _turned(points: Array, corners: IntArray) -> IntArray:
             agreement = float(np.array(signs) @ means[list(axes), range(3)])
             if parity * np.prod(signs) > 0 and agreement > best + 1e-9:
                 best, order, flips = agreement, axes, signs  # type: ignore[assignment]
-    found = corners.transpose(order)
-    return found[tuple(slice(None, None, sign) for sign in flips)]
+    return corners.transpose(order)[tuple(slice(None, None, sign) for sign in flips)]
 
 
-def cubes(points: Array, cells: Sequence[ConvexCell]) -> Hexahedra | None:
+def cubes(points: Array, cells: Sequence[ConvexCell]) -> Complex | None:
     """Return cells that have the faces of cubes as hexahedra; None where one has not."""
-    found = [_cube(cell) for cell in cells]
-    return None if any(one is None for one in found) else Hexahedra(points, np.array(found))
+    hexahedra = [_cube(cell) for cell in cells]
+    return None if any(one is None for one in hexahedra) else Complex(points, np.array(hexahedra))
 
 
 def _cube(cell: ConvexCell) -> IntArray | None:
@@ -111,7 +92,7 @@ def column(bottom: Sequence[int], mates: dict[int, int]) -> IntArray:
     return np.stack([low, np.vectorize(mates.__getitem__)(low)], axis=-1)
 
 
-def subdivided(points: Array, cells: Sequence[ConvexCell]) -> Hexahedra | None:
+def subdivided(points: Array, cells: Sequence[ConvexCell]) -> Complex | None:
     """Return a hexahedron for each corner of each convex cell; None where more than three faces meet at one.
 
     It lies between the corner, the middles of the edges and faces there, and the middle of the cell. Middles belong to
@@ -126,7 +107,7 @@ def subdivided(points: Array, cells: Sequence[ConvexCell]) -> Hexahedra | None:
             rows.append(points[sorted(key)].mean(axis=0))
         return numbers[key]
 
-    found = []
+    hexahedra = []
     for cell in cells:
         for corner in cell.corners:
             beside = {face[face.index(corner) - 1]: face for face in cell.faces if corner in face}  # face after an edge
@@ -141,5 +122,5 @@ def subdivided(points: Array, cells: Sequence[ConvexCell]) -> Hexahedra | None:
                 return None
             bottom = (corner, middle((corner, second)), middle(face), middle((corner, first)))
             tops = (middle((corner, third)), middle(other), middle(cell.corners), middle(last))
-            found.append(column(bottom, dict(zip(bottom, tops, strict=True))))
-    return Hexahedra(np.array(rows), np.array(found))
+            hexahedra.append(column(bottom, dict(zip(bottom, tops, strict=True))))
+    return Complex(np.array(rows), np.array(hexahedra))

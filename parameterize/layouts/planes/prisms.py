@@ -8,15 +8,16 @@ from collections.abc import Iterator
 import numpy as np
 
 from ...arrays import Array
-from .hexahedra import Hexahedra, column
+from ..complex import Complex
+from ..planar.quadrangles import Quadrangles, quadrangles_of
+from .hexahedra import column
 from .polyhedron import Polyhedron
-from .quadrangles import Quadrangles, quadrangles_of
 
 MOST_CORNERS = 40  # of a face that is divided: round outlines have more
 
 
-def columns(body: Polyhedron) -> Iterator[Hexahedra]:
-    """Yield the divisions of a body into columns between two of its faces."""
+def prisms(body: Polyhedron) -> Iterator[Complex]:
+    """Yield the decompositions of a body into columns between two of its faces."""
     for low, mates in _ends(body):
         corners = [vertex for loop in body.loops[low] for vertex in loop]
         if len(corners) > MOST_CORNERS:
@@ -24,9 +25,9 @@ def columns(body: Polyhedron) -> Iterator[Hexahedra]:
         flat = _in_plane(body.vertices[corners], body.planes.normals[low])
         number = {vertex: k for k, vertex in enumerate(corners)}
         loops = [tuple(number[vertex] for vertex in loop) for loop in body.loops[low]]
-        found = quadrangles_of(flat, sorted(loops, key=lambda loop: -_area(flat, loop)))
-        if found is not None:
-            yield _over(found, flat, body.vertices[corners], body.vertices[[mates[vertex] for vertex in corners]])
+        quadrangles = quadrangles_of(flat, sorted(loops, key=lambda loop: -_area(flat, loop)))
+        if quadrangles is not None:
+            yield _over(quadrangles, flat, body.vertices[corners], body.vertices[[mates[vertex] for vertex in corners]])
 
 
 def _ends(body: Polyhedron) -> Iterator[tuple[int, dict[int, int]]]:
@@ -67,18 +68,18 @@ def _area(points: Array, loop: tuple[int, ...]) -> float:
     return float(0.5 * np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y))
 
 
-def _over(found: Quadrangles, flat: Array, low: Array, high: Array) -> Hexahedra:
+def _over(plane: Quadrangles, flat: Array, low: Array, high: Array) -> Complex:
     """Return columns over quadrangles between the corners of two faces (k, 3).
 
     Points on edges lie at the same share of both edges; those inside are where an affine map of one face to the other
     has them, or the map that is nearest to one.
     """
-    flat_rows = np.column_stack([found.points, np.ones(len(found.points))])
+    flat_rows = np.column_stack([plane.points, np.ones(len(plane.points))])
     known = np.column_stack([flat, np.ones(len(flat))])
     ends = list[Array]()
     for face in (low, high):
         inside = flat_rows @ np.linalg.lstsq(known, face, rcond=None)[0]
-        ends += [face[list(own)].mean(axis=0) if own else inside[k] for k, own in enumerate(found.parents)]
-    count = len(found.points)
+        ends += [face[list(own)].mean(axis=0) if own else inside[k] for k, own in enumerate(plane.parents)]
+    count = len(plane.points)
     mates = {k: count + k for k in range(count)}
-    return Hexahedra(np.array(ends), np.array([column(one, mates) for one in found.corners], dtype=np.int64))
+    return Complex(np.array(ends), np.array([column(one, mates) for one in plane.corners], dtype=np.int64))

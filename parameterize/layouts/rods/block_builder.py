@@ -4,28 +4,22 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-from ...arrays import Array, Mask
+from ...arrays import Array, Floats, IntArray, Mask
 from ...spline.interface import face_layer, outward
 from ...surface.solid import Solid
 from ..skeleton.graph import Branch, Skeleton
-from .checks import folded
-from .clearance import Clearance
+from .clearance import FLAT, Clearance
 from .frames import at_lengths
 from .junctions import Junction, junction
-from .rings import ring
-from .rods import Rod, ends_turned, rod
-from .row_faces import begun_at, row_face, strip_cuts
+from .rods import Rod, folded, quarter_turns, ring, rod, tip
 from .rows import LimbRow
 from .splitting import End, stub
-from .strips import BlockCuts
-from .tips import tip
-from .widths import FLAT
+from .strips import BlockCuts, begun_at, row_face, strip_cuts
 
 _THINNER = 0.8  # a factor of sections and junctions that are folded or leave the body
 _SQUARER = 0.2  # share of a plain box by which a junction that is folded comes closer to one
 _SLOPE = 1.25  # the ratio of the factors of neighbouring sections, at most
 _NEAR = 1.5  # times the reach of a section: how far away from a meeting others are made thinner, too
-
 
 _ENOUGH = 0.6  # a rod's end with a factor below: the junction gives way, too
 _NEXT = {0: 1, -1: -2}  # the places of the sections beside the first and the last
@@ -52,20 +46,21 @@ class BlockBuilder:
         self._regular = dict.fromkeys(self._size, 0.0)
         self.junctions: dict[int, Junction] = {}
         self.rods: dict[int, Rod] = {}
-        self.quarters: dict[int, int] = {}
+        self.rings: dict[int, int] = {}  # the quarters by which the last section of a ring is the first one, turned
+        self._turns: dict[int, int] = {}  # of the last face of each rod, by quarters
         self.faces: dict[int, tuple[Array | None, Array | None]] = {}
         self.factors: dict[int, Array] = {}
         self._lay(set(self._size))
 
     def sections(self, number: int) -> Array:
         """Return the sections (m, 2, 2, 3) of a branch."""
-        found = self.rods[number].sections(self.factors[number])
+        sections = self.rods[number].sections(self.factors[number])
         for place, face in zip((0, -1), self.faces[number], strict=True):
             if face is not None:
-                found[place] = face
-        if number in self.quarters:
-            found[-1] = np.rot90(found[0], self.quarters[number])
-        return found
+                sections[place] = face
+        if number in self.rings:
+            sections[-1] = np.rot90(sections[0], self.rings[number])
+        return sections
 
     def corners(self, node: int) -> Array:
         """Return the corners (2, 2, 2, 3) of a junction, [u][v][w]."""
@@ -130,7 +125,7 @@ class BlockBuilder:
             factors[k] = min(factors[k], _SLOPE * factors[k - 1])
         for k in range(len(factors) - 2, -1, -1):
             factors[k] = min(factors[k], _SLOPE * factors[k + 1])
-        if number in self.quarters:
+        if number in self.rings:
             factors[0] = factors[-1] = min(factors[0], factors[-1])
         centers = self.rods[number].centers
         places = [("a rod is folded", np.flatnonzero(bad)), ("a rod leaves the body", np.flatnonzero(outside))]
@@ -145,7 +140,7 @@ class BlockBuilder:
             if number in self.rods and number not in self._in_rows and not nodes.intersection(branch.ends):
                 continue
             if branch.ends[0] == branch.ends[1] and branch.ends[0] not in self.junctions:
-                self.rods[number], self.quarters[number] = ring(branch.points, branch.radii, self._room)
+                self.rods[number], self.rings[number] = ring(branch.points, branch.radii, self._room)
                 self.faces[number] = (None, None)
             else:
                 self._lay_rod(number, branch)
@@ -161,9 +156,10 @@ class BlockBuilder:
         start, stop = (self._begin(number, end) for end in (0, 1))
         span = (start, total - stop)
         if last is not None:
-            last = last.swapaxes(0, 1)
+            last, self._turns[number] = last.swapaxes(0, 1), 0
             if first is not None:
-                last = ends_turned(first, last, at_lengths(branch.points, np.linspace(*span, 100)))
+                turns = quarter_turns(first, last, at_lengths(branch.points, np.linspace(*span, 100)))
+                last, self._turns[number] = np.rot90(last, turns), turns
         self.rods[number] = rod(branch.points, branch.radii, span, first, last, self._room, flat)
         self.faces[number] = (first, last)
 
@@ -185,10 +181,26 @@ class BlockBuilder:
         node = self._skeleton.branches[number].ends[end]
         if node in self._rows:
             return self._face_in_row(node, (number, end))
-        if node not in self.junctions:
-            return None
-        name = self.junctions[node].exits[number, end].face
-        return outward(face_layer(self.corners(node), name), name)
+        return self._exit(number, end, self.corners(node)) if node in self.junctions else None
+
+    def _exit(self, number: int, end: int, corners: Floats) -> Floats:
+        """Return the part (2, 2, ...) of the corners (2, 2, 2, ...) of a junction through which a branch end leaves."""
+        name = self.junctions[self._skeleton.branches[number].ends[end]].exits[number, end].face
+        return outward(face_layer(corners, name), name)
+
+    def ends(
+        self, number: int, junctions: Mapping[int, IntArray], strips: Mapping[int, IntArray]
+    ) -> list[IntArray | None]:
+        """Return the vertices (2, 2) of a rod's first and last section; None where nothing is glued to it yet.
+
+        junctions: the vertices (2, 2, 2) of each, by its node. strips: those (2, 2) of the strips where limbs of rows
+        begin, by the limbs' branches.
+        """
+        nodes = self._skeleton.branches[number].ends
+        first, last = (self._exit(number, k, junctions[n]) if n in junctions else None for k, n in enumerate(nodes))
+        if last is not None:
+            last = np.rot90(last.swapaxes(0, 1), self._turns[number])
+        return [strips.get(number, first), last]
 
     def _row_face(self, node: int) -> Array:
         """Return the corners (2, 2, 3) of the end of a flat part where a row of limbs begins, right-handed outward."""
@@ -202,7 +214,7 @@ class BlockBuilder:
             return self._row_face(node).swapaxes(0, 1)
         cuts, order = self._cuts(node)
         strip = order.index(row.limbs.index(branch_end))
-        return cuts.parts(self._laid_face(node), cuts.axis)[strip]
+        return cuts.parts(self._laid_face(node))[strip]
 
     def _laid_face(self, node: int) -> Array:
         """Return the last section (2, 2, 3) of a row's stem as it is laid, right-handed outward."""
@@ -211,12 +223,12 @@ class BlockBuilder:
         assert face is not None, "a row's stem has a face"
         return face if end else face.swapaxes(0, 1)
 
-    def strips(self) -> Iterator[tuple[int, BlockCuts]]:
-        """Yield the number of each row's stem, and where its block is cut into strips."""
+    def strips(self) -> Iterator[tuple[End, BlockCuts, list[int]]]:
+        """Yield of each row the stem, where its block is cut into strips, and the branch of the limb of each strip."""
         for node, row in self._rows.items():
-            number, end = row.stem
-            cuts, _ = self._cuts(node)
-            yield number, cuts if end else cuts.along(1 - cuts.axis, flipped=False)
+            cuts, order = self._cuts(node)
+            limbs = [row.limbs[k][0] for k in order]
+            yield row.stem, cuts if row.stem[1] else cuts.along(1 - cuts.axis, flipped=False), limbs
 
     def _cuts(self, node: int) -> tuple[BlockCuts, list[int]]:
         """Return where a row's stem is cut into strips, seen along the limbs, and the limb of each strip."""

@@ -9,11 +9,9 @@ from ...arrays import Array
 from ...spline.interface import axis_side
 from ...spline.volume import FACE_NAMES
 from ..skeleton.graph import Skeleton
-from .assignment import NORMALS
-from .clearance import Clearance
+from .clearance import FLAT, THIN, Clearance
 from .frames import arc_lengths, rotated, tangents
-from .splitting import End, junction_at, stub
-from .widths import FLAT, THIN
+from .splitting import NORMALS, End, junction_at, stub
 
 _SHARE = 0.35  # of a branch, at most: what a junction takes at each of its ends
 _CORNERS = 2.0 * np.array(list(np.ndindex(2, 2, 2))) - 1.0  # (8, 3), -1 or 1

@@ -11,9 +11,8 @@ import numpy as np
 
 from ...surface.solid import Solid
 from ..skeleton.graph import Branch, Skeleton, without_lone_nodes
-from .assignment import MOST
 from .frames import at_lengths
-from .splitting import branch_ends, junction_at, led_to
+from .splitting import MOST, branch_ends, junction_at, led_to
 
 _SHORT = 2.0  # radii of the thicker node: the length of a branch that may be taken out
 _TIGHT_FIT = np.radians(40.0)  # where there are more than four: the same for these

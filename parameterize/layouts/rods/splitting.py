@@ -1,15 +1,14 @@
-"""Splits nodes whose branches one cube cannot serve into two nodes with a short branch between them."""
+"""Gives each branch at a node a face of a cube, and splits nodes whose branches one cube cannot serve into two."""
 
 from collections.abc import Container
-from dataclasses import replace
-from itertools import combinations
+from dataclasses import dataclass, replace
+from itertools import combinations, permutations
 
 import numpy as np
 
-from ...arrays import Array, Mask
+from ...arrays import Array, IntArray, Mask
 from ...surface.solid import Solid
 from ..skeleton.graph import Branch, Skeleton
-from .assignment import MOST, Assignment, assigned
 from .frames import arc_lengths, at_lengths, unit
 
 _SKEW = np.radians(48.0)  # between a branch and the normal of its face: above, a junction is split where that helps
@@ -21,6 +20,44 @@ _ROOM = 2.0  # radii of a node: no room is taken for larger, so that a plate's n
 _ROUNDINGS = 10  # of a branch that is led to another node, where it has a kink
 
 End = tuple[int, int]  # the number of a branch, and 0 for its first end, 1 for its last
+NORMALS = np.array([sign * np.eye(3)[axis] for axis in range(3) for sign in (-1.0, 1.0)])  # of u0, u1, v0, v1, w0, w1
+MOST = len(NORMALS)  # branches at one junction
+
+
+@dataclass(frozen=True, eq=False)
+class Assignment:
+    """The faces of a cube through which branches leave it.
+
+    Attributes
+    ----------
+    faces : (d,) array of int
+        The number of the face of each branch, in the order u0, u1, v0, v1, w0, w1.
+    axes : (3, 3) array
+        The directions of u, v and w in space, one a row: orthonormal and right-handed.
+    angles : (d,) array
+        Between each branch and the outward normal of its face, in radians.
+    """
+
+    faces: IntArray
+    axes: Array
+    angles: Array
+
+
+def assigned(directions: Array) -> Assignment:
+    """Return the assignment whose squared angles have the least sum, for unit vectors (d, 3), 2 <= d <= 6.
+
+    Every assignment is tried, the first branch at u0, since turns of the cube are free; its best turn is that of
+    Kabsch, "A solution for the best rotation to relate two sets of vectors", Acta Cryst. A32 (1976).
+    """
+    rest = permutations(range(1, MOST), len(directions) - 1)
+    faces = np.array([(0, *others) for others in rest])  # (k, d)
+    left, _, right = np.linalg.svd(np.einsum("kda,db->kab", NORMALS[faces], directions))
+    left[:, :, 2] *= np.linalg.det(left @ right)[:, None]
+    axes = left @ right  # (k, 3, 3): row a is the direction of parameter a
+    cosines = np.einsum("kda,kab,db->kd", NORMALS[faces], axes, directions)
+    angles = np.arccos(np.clip(cosines, -1.0, 1.0))
+    best = int(np.argmin((angles**2).sum(axis=1).round(9)))
+    return Assignment(faces[best], axes[best], angles[best])
 
 
 def split(skeleton: Skeleton, body: Solid, rows: Container[int] = ()) -> Skeleton:
@@ -33,7 +70,7 @@ def split(skeleton: Skeleton, body: Solid, rows: Container[int] = ()) -> Skeleto
         ends = branch_ends(skeleton, node)
         group = _group(skeleton, node, ends, body) if len(ends) > 3 and node not in rows else ()
         if group:
-            skeleton = _divided(skeleton, node, ends, group, body)
+            skeleton = _parted(skeleton, node, ends, group, body)
         else:
             node += 1
     return skeleton
@@ -80,7 +117,7 @@ def _group(skeleton: Skeleton, node: int, ends: list[End], body: Solid) -> tuple
         for group in combinations(range(len(ends)), size):
             if 2 * size == len(ends) and 0 not in group:
                 continue  # the other half of a pair that was tried
-            skew = _skew_of(_divided(skeleton, node, ends, group, body), (node, len(skeleton.nodes)))
+            skew = _skew_of(_parted(skeleton, node, ends, group, body), (node, len(skeleton.nodes)))
             best = min(best, (skew + _mixed(ways, group), group))
     return best[1]
 
@@ -111,7 +148,7 @@ def _skew_of(skeleton: Skeleton, nodes: tuple[int, int]) -> float:
     return skew
 
 
-def _divided(skeleton: Skeleton, node: int, ends: list[End], group: tuple[int, ...], body: Solid) -> Skeleton:
+def _parted(skeleton: Skeleton, node: int, ends: list[End], group: tuple[int, ...], body: Solid) -> Skeleton:
     """Return the skeleton with a node divided: the branch ends of the group leave a new node, the last one."""
     center, radius, new = skeleton.nodes[node], float(skeleton.radii[node]), len(skeleton.nodes)
     ways = directions(skeleton, node, ends)

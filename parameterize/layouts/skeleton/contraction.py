@@ -3,7 +3,7 @@
 import numpy as np
 
 from ...arrays import Array
-from .depth import Depth
+from .lattice import Depth
 from .web import Arc, Key, Web, length_of
 
 MOST = 6  # arcs at a node: the faces of the block that is laid there

@@ -4,7 +4,7 @@ import numpy as np
 from scipy.sparse import coo_array, csr_array, diags_array
 
 from ...arrays import Array, IntArray
-from .depth import Depth
+from .lattice import Depth
 from .web import Arc, Web, length_of
 
 SPACING = 1.0  # cells between the points of a curve

@@ -19,6 +19,7 @@ FINER = 2.0**0.5
 MOST_POINTS = 6_000_000  # of the box, at the last level: thinning and distances take some ten seconds there
 LOST = 0.003  # share of the points: crumbs at sharp edges are below, and a part of the body that fell off is above
 _OFFSET = np.array([2.512345, 2.498765, 2.543211])  # in cells: two layers of points outside, none on a model's faces
+_TO_SURFACE = 0.5  # cells: the surface passes halfway between a point inside and the nearest one outside, on average
 _ALL_NEIGHBOURS = np.ones((3, 3, 3), dtype=bool)
 
 
@@ -100,3 +101,25 @@ def _in_one_piece(inside: Mask, low: Array, cell: float) -> Lattice:
     total = max(int(sizes.sum()), 1)
     lost = (total - sizes.max() + np.count_nonzero(filled) - np.count_nonzero(piece)) / total
     return Lattice(filled, low, cell, 1 - int(euler_number(filled, connectivity=3)), float(lost))
+
+
+class Depth:
+    """The distance from the surface, in cells, at and between the points of a lattice."""
+
+    def __init__(self, inside: Mask) -> None:
+        """Compute the distance of each point inside, (n_x, n_y, n_z), from the nearest point outside."""
+        self.inside = inside
+        self.values: Array = ndimage.distance_transform_edt(inside) - _TO_SURFACE * inside
+
+    def at(self, points: Array) -> Array:
+        """Return the distance (k,) at points (k, 3), by trilinear interpolation."""
+        return np.asarray(ndimage.map_coordinates(self.values, points.T, order=1))
+
+    def uphill(self, points: Array) -> Array:
+        """Return the direction (k, 3) in which the distance grows at points (k, 3), as long as its rate."""
+        steps = 0.5 * np.eye(3)
+        return np.stack([self.at(points + step) - self.at(points - step) for step in steps], axis=1)
+
+    def deepest(self) -> IntArray:
+        """Return the index (3,) of the point farthest from the surface."""
+        return np.array(np.unravel_index(np.argmax(self.values), self.values.shape))

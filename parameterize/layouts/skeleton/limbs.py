@@ -4,7 +4,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ...arrays import Array, IntArray
-from .depth import Depth
+from .lattice import Depth
 from .protrusions import protrusions
 from .web import Arc, Web, length_of
 

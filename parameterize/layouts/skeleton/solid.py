@@ -9,9 +9,8 @@ from ...arrays import Array, IntArray, in_brackets
 from ...surface.solid import Solid
 from .contraction import contract, divide, drop_stubs
 from .curves import smoothed
-from .depth import Depth
 from .graph import Branch, Skeleton, SkeletonError
-from .lattice import Lattice, lattices
+from .lattice import Depth, Lattice, lattices
 from .limbs import add_limbs
 from .thinning import web_of
 from .web import Web

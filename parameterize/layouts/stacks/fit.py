@@ -4,7 +4,7 @@ import numpy as np
 
 from ...arrays import Array
 from ...spline.bspline import collocation, open_uniform_knots
-from .curves import Curve
+from ..planar.curves import Curve
 
 _CLOSE = 1e-4  # of the diagonal: the distance of a fitted curve from the outline's curve, at most
 _OWN = 0.25  # of the distance between curve and polygonal line: closer is not worth more spans, unless this is large

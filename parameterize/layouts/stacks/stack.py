@@ -12,7 +12,8 @@ import numpy as np
 from ...arrays import Array, IntArray
 from ...surface.geometry import doubled_areas, signed_volume
 from ...surface.planes import FLAT
-from .plane_warp import PlaneWarp
+from ..planar.plane_warp import PlaneWarp
+from ..planar.polygons import area_of
 
 _MOST_AXES = 6  # that are tried: the normals with the most area
 _ALIKE = 1e-3  # the normals in one cell of this size are one direction
@@ -52,6 +53,10 @@ class Stack:
         areas = np.array([sum(area_of(loop) for loop in loops) for loops in self.profiles])
         return float(areas @ np.diff(self.heights))
 
+    def in_space(self, points: Array, level: int) -> Array:
+        """Return points (..., 2) of the plane at a height, by its number: (..., 3)."""
+        return np.asarray(points @ self.frame[:2] + self.heights[level] * self.frame[2])
+
 
 def stack_of(vertices: Array, faces: IntArray) -> Stack | None:
     """Return a closed surface, vertices (n, 3) and faces (m, 3), as a stack of extrusions; None where it is none.
@@ -78,12 +83,6 @@ def stack_of(vertices: Array, faces: IntArray) -> Stack | None:
 def nearness(vertices: Array) -> float:
     """Return the distance within which points of a surface (n, 3) are one."""
     return 4.0 * FLAT * float(np.linalg.norm(np.ptp(vertices, axis=0)))
-
-
-def area_of(loop: Loop) -> float:
-    """Return the area of a polygon (k, 2), negative where it is clockwise."""
-    x, y = (loop - loop[0]).T
-    return float(0.5 * np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y))
 
 
 def axes_of(areas: Array) -> Iterator[Array]:

@@ -6,52 +6,51 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...arrays import Array, IntArray
-from ...certificate.body import certify
-from ...certificate.boundary import check_boundary
-from ...spline.bspline import greville, open_uniform_knots
-from ...spline.spline_map import ControlNets, SplineMap
+from ...spline.bspline import greville
+from ...spline.interface import Face
+from ...spline.spline_map import SplineMap
 from ...surface.features import SHARP
-from ..planes.exact_blocks import FEWEST_SPANS, MOST_BLOCKS, balanced_spans
-from ..rods.along_skeleton import Block, BlockLayout
-from .coons import Quad
-from .curves import Chain, Curve, chains_of
-from .division import Division, division_of
+from ..complex import FEWEST_SPANS, MOST_BLOCKS, Complex, is_proved, spline_of
+from ..planar.coons import Quad, coons_patch
+from ..planar.curves import Chain, Curve, chains_of
+from ..planar.decomposition import Decomposition, decomposition_of
+from ..planar.lines import lines_of
+from ..planar.planar_graph import Cutting, network_of
+from ..planar.polygons import area_of, edges_of
+from ..planar.regions import PlaneRegion, regions_of
 from .fit import deviation, fitted, needed_spans
-from .lines import lines_of
-from .planar_graph import Cutting, network_of
-from .regions import PlaneRegion, regions_of
-from .stack import SAME, Stack, area_of, stack_of
+from .stack import SAME, Stack, stack_of
 from .tapers import tapered_stack_of
 
-_GOOD = 0.3  # quality of a division after which no other cutting is tried
+_GOOD = 0.3  # quality of a decomposition after which no other cutting is tried
 _CUTTINGS = (Cutting(), Cutting(radial=True), Cutting(finer=2.0), Cutting(finer=2.0, facing=True))
+
+_Regions = tuple[PlaneRegion, ...]
 
 
 @dataclass(frozen=True, eq=False)
-class Columns:
-    """Blocks over a plane division, between the heights of a stack.
+class StackedBlocks:
+    """Blocks over a plane decomposition, between the heights of a stack.
 
     Attributes
     ----------
-    layout : BlockLayout
-        The blocks with straight edges, and their spans.
+    blocks : Complex
     spline : SplineMap
-        With the curves.
     off : float
         How far the curves are from the outlines of the surface at most, over the diagonal of its box.
     """
 
-    layout: BlockLayout
+    blocks: Complex
     spline: SplineMap
     off: float
 
     def __len__(self) -> int:
-        return len(self.layout)
+        return len(self.blocks)
 
 
-def columns_of(
+def stacked_blocks(
     vertices: Array, faces: IntArray, spans: int, degree: int, most: int | None = None, sharp: float = SHARP
-) -> Columns | None:
+) -> StackedBlocks | None:
     """Return blocks that fill a stack of extrusions, and are proved to be one-to-one; None where there are none.
 
     vertices: (n, 3), faces: (m, 3), of a closed surface. spans: across a block that is a cube. most: blocks, at most.
@@ -62,29 +61,28 @@ def columns_of(
         return None
     diagonal = float(np.linalg.norm(np.ptp(vertices, axis=0)))
     limit = MOST_BLOCKS if most is None else min(most, MOST_BLOCKS)
-    found = list(_divisions(stack, limit, sharp))
-    for division, regions in sorted(found, key=lambda row: row[0].cost):
-        columns = _columns(division, regions, stack, spans, degree, diagonal)
-        if _is_proved(columns.spline):
-            return columns
+    for plane, regions in sorted(_decompositions(stack, limit, sharp), key=lambda row: row[0].cost):
+        made = _over(plane, regions, stack, spans, degree, diagonal)
+        if is_proved(made.spline.body):
+            return made
     return None
 
 
-def _divisions(stack: Stack, most: int, sharp: float) -> Iterator[tuple[Division, tuple[PlaneRegion, ...]]]:
-    """Yield divisions of the profiles into columns, `most` blocks or fewer, that fill the body, until one is good."""
-    lines = lines_of(stack)
+def _decompositions(stack: Stack, most: int, sharp: float) -> Iterator[tuple[Decomposition, _Regions]]:
+    """Yield decompositions of the profiles, for `most` blocks or fewer that fill the body, until one is good."""
+    lines = lines_of(stack.profiles, stack.near)
     if lines is None:
         return
     for corners, chains in _chains(*lines, sharp):
         for cutting in _CUTTINGS:
             network = network_of(lines[0][corners], chains, cutting)
-            regions = regions_of(network, stack)
-            division = division_of(network, regions, most, facing=cutting.facing) if regions else None
-            if division is None or not regions or not _fills(division, regions, stack):
+            regions = regions_of(network, stack.profiles)
+            plane = decomposition_of(network, regions, most, facing=cutting.facing) if regions else None
+            if plane is None or not regions or not _fills(plane, regions, stack):
                 continue
-            division = division.smoothed()
-            yield division, regions
-            if division.quality > _GOOD:
+            plane = plane.smoothed()
+            yield plane, regions
+            if plane.quality > _GOOD:
                 return
 
 
@@ -99,13 +97,13 @@ def _chains(points: Array, lines: IntArray, sharp: float) -> Iterator[tuple[list
         yield whole
 
 
-def _fills(division: Division, regions: tuple[PlaneRegion, ...], stack: Stack) -> bool:
-    """Return whether columns over quadrangles have a stack's volume, up to what lies between curves and their lines."""
+def _fills(plane: Decomposition, regions: _Regions, stack: Stack) -> bool:
+    """Return whether blocks over quadrangles have a stack's volume, up to what lies between curves and their lines."""
     layers = np.array([np.diff(stack.heights)[list(region.solid)].sum() for region in regions])
     total = between = 0.0
-    for (a, b, c, d), owner in zip(division.quads, division.owners, strict=True):
-        curves = [division.sides.get(edge) for edge in ((a, b), (b, c), (c, d), (d, a))]
-        rows = [c.samples if c is not None else division.points[[k]] for c, k in zip(curves, (a, b, c, d), strict=True)]
+    for quad, owner in zip(plane.quads, plane.owners, strict=True):
+        curves = [plane.sides.get(edge) for edge in edges_of(quad)]
+        rows = [c.samples if c is not None else plane.points[[k]] for c, k in zip(curves, quad, strict=True)]
         total += layers[owner] * area_of(np.concatenate(rows))
         between += layers[owner] * sum(_between(curve) for curve in curves if curve is not None)
     return abs(total - stack.volume) <= between + SAME * stack.volume
@@ -116,95 +114,71 @@ def _between(curve: Curve) -> float:
     return abs(area_of(np.concatenate([curve.samples, curve.points[::-1]])))
 
 
-def _columns(
-    division: Division, regions: tuple[PlaneRegion, ...], stack: Stack, spans: int, degree: int, diagonal: float
-) -> Columns:
-    """Return the blocks over the quadrangles of a division."""
-    plan = [
-        (quad, layer)
-        for quad, owner in zip(division.quads, division.owners, strict=True)
-        for layer in np.flatnonzero(regions[owner].solid).tolist()
-    ]
-    levels = [division.moved(field) for field in stack.fields] or [division] * len(stack.heights)
-    blocks = [_block(k, levels, stack, *one, (1, 1, 1)) for k, one in enumerate(plan)]
-    plain = BlockLayout.from_blocks(blocks)
-    lengths, fewest = np.empty((len(plan), 3)), np.full((len(plan), 3), FEWEST_SPANS)
-    needs = {edge: needed_spans(curve, degree, diagonal) for edge, curve in division.sides.items() if edge[0] < edge[1]}
-    for k, ((a, b, c, d), layer) in enumerate(plan):
-        lengths[k, 2] = stack.heights[layer + 1] - stack.heights[layer]
+def _over(
+    plane: Decomposition, regions: _Regions, stack: Stack, spans: int, degree: int, diagonal: float
+) -> StackedBlocks:
+    """Return the blocks over the quadrangles of a decomposition."""
+    quads, layers = [], []
+    for quad, owner in zip(plane.quads, plane.owners, strict=True):
+        for layer in np.flatnonzero(regions[owner].solid).tolist():
+            quads.append(quad)
+            layers.append(layer)
+    levels = [plane.moved(field) for field in stack.fields] or [plane] * len(stack.heights)
+    straight = _straight(quads, layers, levels, stack)
+    lengths, fewest = np.empty((len(quads), 3)), np.full((len(quads), 3), FEWEST_SPANS)
+    needs = {edge: needed_spans(curve, degree, diagonal) for edge, curve in plane.sides.items() if edge[0] < edge[1]}
+    lengths[:, 2] = np.diff(stack.heights)[layers]
+    for k, (a, b, c, d) in enumerate(quads):
         for axis, pair in enumerate((((a, b), (d, c)), ((a, d), (b, c)))):
-            lengths[k, axis] = np.mean([_length(division, edge) for edge in pair])
+            lengths[k, axis] = np.mean([_length(plane, edge) for edge in pair])
             fewest[k, axis] = max(needs.get((min(edge), max(edge)), 1) for edge in pair)
-    counts = balanced_spans(plain, lengths, spans, fewest)
-    layout = replace(
-        plain, blocks=tuple(replace(one, spans=tuple(row)) for one, row in zip(blocks, counts.tolist(), strict=True))
-    )
-    knots = tuple(tuple(open_uniform_knots(degree + n, degree) for n in row) for row in counts.tolist())
-    nets = ControlNets(degree, knots, plain.interfaces)  # type: ignore[arg-type]
-    parts, off = [], 0.0
-    for (quad, layer), own in zip(plan, knots, strict=True):
-        ends = [_plane_net(levels[layer], quad, own, degree)]
-        ends += [ends[0] if stack.fields == () else _plane_net(levels[layer + 1], quad, own, degree)]
+    blocks = straight.with_even_spans(lengths, spans, fewest)
+    surfaces, off = dict[Face, Array](), 0.0
+    for k, (quad, layer, knots) in enumerate(zip(quads, layers, blocks.nets(degree).knots, strict=True)):
+        ends = [_plane_net(levels[layer], quad, knots, degree)]
+        ends += [ends[0] if stack.fields == () else _plane_net(levels[layer + 1], quad, knots, degree)]
         off = max(off, *(away for _, away in ends))
-        low, high = (
-            net @ stack.frame[:2] + stack.heights[k] * stack.frame[2] for k, (net, _) in enumerate(ends, layer)
-        )
-        share = greville(own[2], degree)[:, None]
-        parts.append(np.moveaxis((1.0 - share) * low[:, :, None] + share * high[:, :, None], -1, 0))
-    return Columns(layout, SplineMap(nets, nets.merged(nets.joined(parts))), off / diagonal)
+        for level, name, (net, _) in zip((layer, layer + 1), ("w0", "w1"), ends, strict=True):
+            surfaces[k, name] = stack.in_space(net, level)
+    blocks = replace(blocks, surfaces=surfaces)
+    return StackedBlocks(blocks, spline_of(blocks, degree), off / diagonal)
 
 
-def _plane_net(division: Division, quad: Quad, knots: Sequence[Array], degree: int) -> tuple[Array, float]:
+def _straight(quads: Sequence[Quad], layers: Sequence[int], levels: Sequence[Decomposition], stack: Stack) -> Complex:
+    """Return the blocks over quadrangles between two levels each, with straight edges.
+
+    A point of the plane is a vertex at each level.
+    """
+    points = np.concatenate([stack.in_space(plane.points, level) for level, plane in enumerate(levels)])
+    corners = np.array(quads)[:, [[0, 3], [1, 2]]]  # (k, 2, 2), [u][v]
+    low = corners + len(levels[0].points) * np.array(layers)[:, None, None]
+    return Complex(points, np.stack([low, low + len(levels[0].points)], axis=-1))
+
+
+def _plane_net(plane: Decomposition, quad: Quad, knots: Sequence[Array], degree: int) -> tuple[Array, float]:
     """Return the control points (n_u, n_v, 2) over a quadrangle, and how far its sides are from their curves."""
     (a, b, c, d), off = quad, 0.0
     edges = ((a, b), (d, c), (a, d), (b, c))
-    rows = [_side(division, edge, knots[k // 2], degree) for k, edge in enumerate(edges)]
+    rows = [_side(plane, edge, knots[k // 2], degree) for k, edge in enumerate(edges)]
     for k, (edge, row) in enumerate(zip(edges, rows, strict=True)):
-        if edge in division.sides:
-            off = max(off, deviation(division.sides[edge], knots[k // 2], degree, row))
-    return _coons(rows, *(greville(row, degree) for row in knots[:2])), off
+        if edge in plane.sides:
+            off = max(off, deviation(plane.sides[edge], knots[k // 2], degree, row))
+    low, high, left, right = rows
+    u, v = (greville(row, degree) for row in knots[:2])
+    return coons_patch(low, high, left, right, u, v), off
 
 
-def _block(
-    number: int,
-    levels: Sequence[Division],
-    stack: Stack,
-    quad: tuple[int, ...],
-    layer: int,
-    spans: tuple[int, int, int],
-) -> Block:
-    """Return the column over a quadrangle between two heights, with straight edges."""
-    sections = []
-    for k in (layer, layer + 1):
-        a, b, c, d = levels[k].points[list(quad)] @ stack.frame[:2]
-        sections.append(np.array([[a, d], [b, c]]) + stack.heights[k] * stack.frame[2])
-    return Block(f"column {number}", np.stack(sections), spans)
+def _length(plane: Decomposition, edge: tuple[int, int]) -> float:
+    curve = plane.sides.get(edge)
+    return curve.length if curve is not None else float(np.linalg.norm(np.diff(plane.points[list(edge)], axis=0)))
 
 
-def _length(division: Division, edge: tuple[int, int]) -> float:
-    curve = division.sides.get(edge)
-    return curve.length if curve is not None else float(np.linalg.norm(np.diff(division.points[list(edge)], axis=0)))
-
-
-def _side(division: Division, edge: tuple[int, int], knots: Array, degree: int) -> Array:
+def _side(plane: Decomposition, edge: tuple[int, int], knots: Array, degree: int) -> Array:
     """Return the control points (n, 2) of a side, the same in both directions."""
-    curve = division.sides.get(edge)
+    curve = plane.sides.get(edge)
     if curve is None:
         share = greville(knots, degree)[:, None]
-        return (1.0 - share) * division.points[edge[0]] + share * division.points[edge[1]]
+        return (1.0 - share) * plane.points[edge[0]] + share * plane.points[edge[1]]
     if edge[0] > edge[1]:
-        return fitted(division.sides[edge[::-1]], knots, degree)[::-1]
+        return fitted(plane.sides[edge[::-1]], knots, degree)[::-1]
     return fitted(curve, knots, degree)
-
-
-def _coons(rows: list[Array], u: Array, v: Array) -> Array:
-    """Return the control points (n_u, n_v, 2) of a Coons patch between those of v = 0, v = 1, u = 0 and u = 1."""
-    low, high, left, right = rows
-    s, t = u[:, None, None], v[None, :, None]
-    ruled = (1 - t) * low[:, None] + t * high[:, None] + (1 - s) * left[None] + s * right[None]
-    return ruled - (1 - s) * ((1 - t) * low[0] + t * high[0]) - s * ((1 - t) * low[-1] + t * high[-1])
-
-
-def _is_proved(spline: SplineMap) -> bool:
-    """Return whether blocks are certified and their boundary is proved not to meet itself."""
-    return certify(spline.body).verdict == "certified" and check_boundary(spline.body).injective is True

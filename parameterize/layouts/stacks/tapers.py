@@ -14,9 +14,9 @@ from scipy.spatial import cKDTree
 from ...arrays import Array, IntArray
 from ...surface.features import SHARP
 from ...surface.geometry import doubled_areas, signed_volume
-from .lines import straightened
-from .plane_warp import PlaneWarp
-from .stack import MOST_SLABS, SAME, Loop, Stack, area_of, axes_of, frame_of, nearness, section
+from ..planar.plane_warp import PlaneWarp
+from ..planar.polygons import area_of, straightened
+from .stack import MOST_SLABS, SAME, Loop, Stack, axes_of, frame_of, nearness, section
 
 _MOST_HEIGHTS = 40  # of a surface's vertices: others are no outlines with straight lines between them
 _LEAST = 1e-3  # of a section's width, from one end of a slab to the other: a side that closes to a tip has no outline

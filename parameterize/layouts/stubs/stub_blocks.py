@@ -6,13 +6,13 @@ import numpy as np
 
 from ...arrays import Array, IntArray
 from ...spline.bspline import breakpoints
-from ...spline.interface import outward
+from ...spline.interface import face_layer, outward
 from ...spline.volume import FACE_NAMES, BSplineVolume
-from ..rods.along_skeleton import BlockLayout, LayoutError
-from ..rods.block import Block
+from ..complex import Complex, Vertices
+from ..rods.along_skeleton import LayoutError
 from ..rods.clearance import Clearance
 from ..rods.frames import arc_lengths, at_lengths
-from ..rods.rods import ends_turned, rod
+from ..rods.rods import quarter_turns, rod
 from .pieces import Handle
 
 ACROSS = 3  # spans of the body's map that a stub covers in both directions
@@ -51,10 +51,10 @@ def footprint(parameters: Array, faces: IntArray, spans: int) -> Footprint:
     return Footprint(face, (first, second))
 
 
-def stub_layout(
+def stub_blocks(
     volume: BSplineVolume, ends: list[tuple[Footprint, Footprint]], handles: tuple[Handle, ...], room: Clearance
-) -> tuple[BlockLayout, tuple[BSplineVolume, ...]]:
-    """Return the layout of the handles' rods, then the body's blocks; and the map of each of these.
+) -> tuple[Complex, tuple[BSplineVolume, ...]]:
+    """Return the handles' rods, then the body's blocks; and the map of each of these.
 
     volume: the map of the body, with uniform knots. ends: the footprints of each handle at its first and last end.
     Raises LayoutError where two of them are the same.
@@ -65,15 +65,23 @@ def stub_layout(
     starts = [_apart([one.first[one.axes.index(axis)] for one in feet if axis in one.axes]) for axis in range(3)]
     cuts = [sorted({0, spans, *row, *(first + ACROSS for first in row)}) for row in starts]
     parts = volume.divided(*(ends_of_spans[row[1:-1]] for row in cuts))  # type: ignore[arg-type]
-    cells = np.ndindex(*(len(row) - 1 for row in cuts))
-    pieces = {cell: _piece(cell, part) for cell, part in zip(cells, parts, strict=True)}
-    faces = [_face(one, starts, cuts, pieces) for one in feet]
+    cells = list(np.ndindex(*(len(row) - 1 for row in cuts)))
+    vertices = np.arange(np.prod([len(row) for row in cuts])).reshape([len(row) for row in cuts])
+    hexahedra = {cell: vertices[tuple(slice(k, k + 2) for k in cell)] for cell in cells}
+    points = np.empty((vertices.size, 3))
+    for cell, part in zip(cells, parts, strict=True):
+        points[hexahedra[cell]] = part.control_points[np.ix_((0, -1), (0, -1), (0, -1))]
+    faces = [_face(one, starts, cuts, hexahedra) for one in feet]
     if len({face.tobytes() for face in faces}) < len(faces):
         raise LayoutError("handles leave the body at nearly the same place: no stubs fit beside each other there")
-    rods = []
+    made, sections, counts = Vertices(points), dict[str, IntArray](), []
     for number, (handle, first, last) in enumerate(zip(handles, faces[::2], faces[1::2], strict=True)):
-        rods.append(_rod(f"handle {number}", handle, first, last.swapaxes(0, 1), room))
-    return BlockLayout.from_blocks([*rods, *pieces.values()]), parts
+        sections[f"handle {number}"], along = _rod(handle, first, last.swapaxes(0, 1), made, room)
+        counts.append((ACROSS, ACROSS, along))
+    for cell, part in zip(cells, parts, strict=True):
+        sections[f"body {'.'.join(map(str, cell))}"] = hexahedra[cell]
+        counts.append(tuple(len(breakpoints(row)) - 1 for row in part.knots))  # type: ignore[arg-type]
+    return Complex.of(made.array, sections, counts), parts
 
 
 def _apart(firsts: list[int]) -> list[int]:
@@ -87,34 +95,30 @@ def _apart(firsts: list[int]) -> list[int]:
     return [round(float(np.mean(group))) for group in groups]
 
 
-def _piece(cell: tuple[int, ...], part: BSplineVolume) -> Block:
-    """Return the block between the corners of a part of the body."""
-    corners = part.control_points[np.ix_((0, -1), (0, -1), (0, -1))]
-    u, v, w = (len(breakpoints(row)) - 1 for row in part.knots)
-    return Block(f"body {'.'.join(map(str, cell))}", np.moveaxis(corners, 2, 0), (u, v, w))
-
-
 def _face(
-    one: Footprint, starts: list[list[int]], cuts: list[list[int]], pieces: dict[tuple[int, ...], Block]
-) -> Array:
-    """Return the corners (2, 2, 3) of the block's face below a stub, right-handed with its outward normal."""
+    one: Footprint, starts: list[list[int]], cuts: list[list[int]], hexahedra: dict[tuple[int, ...], IntArray]
+) -> IntArray:
+    """Return the vertices (2, 2) of the block's face below a stub, right-handed with its outward normal."""
     axis, side = divmod(one.face, 2)
     cell = [0, 0, 0]
     cell[axis] = len(cuts[axis]) - 2 if side else 0
     for first, own in zip(one.first, one.axes, strict=True):
         cell[own] = cuts[own].index(min(starts[own], key=lambda start: abs(start - first)))
     name = FACE_NAMES[one.face]
-    return outward(pieces[cell[0], cell[1], cell[2]].face(name), name)
+    return outward(face_layer(hexahedra[cell[0], cell[1], cell[2]], name), name)
 
 
-def _rod(name: str, handle: Handle, first: Array, last: Array, room: Clearance) -> Block:
-    """Return the rod along the curve of a handle between two faces (2, 2, 3), both right-handed with it."""
+def _rod(handle: Handle, below: IntArray, above: IntArray, made: Vertices, room: Clearance) -> tuple[IntArray, int]:
+    """Return the vertices (2, 2, m) and the spans along a rod along the curve of a handle; those inside are added.
+
+    below, above: the vertices (2, 2) of the faces between which it lies, both right-handed with it.
+    """
+    first, last = made.array[below], made.array[above]
     bends = np.concatenate([first.mean(axis=(0, 1))[None], handle.curve, last.mean(axis=(0, 1))[None]])
     length = float(arc_lengths(bends)[-1])
     curve = at_lengths(bends, np.linspace(0.0, length, _PLACES))
-    last = ends_turned(first, last, curve)
-    laid = rod(curve, np.full(_PLACES, handle.radius), (0.0, length), first, last, room)
-    sections = laid.sections(np.ones(len(laid.centers)))
-    sections[0], sections[-1] = first, last
+    turns = quarter_turns(first, last, curve)
+    laid = rod(curve, np.full(_PLACES, handle.radius), (0.0, length), first, np.rot90(last, turns), room)
+    inside = made.add(laid.sections(np.ones(len(laid.centers)))[1:-1])
     along = int(np.clip(round(ACROSS * length / (2.0 * _STRETCH * handle.radius)), *_ALONG))
-    return Block(name, sections, (ACROSS, ACROSS, along))
+    return np.stack([below, *inside, np.rot90(above, turns)], axis=-1), along

@@ -112,14 +112,3 @@ def _added(nodes: list[Array], points: Array) -> list[int]:
     """Add nodes, and return their numbers."""
     nodes += list(points)
     return list(range(len(nodes) - len(points), len(nodes)))
-
-
-def inside_of(loops: Sequence[Array], points: Array) -> Array:
-    """Return for each point (n, 2) whether closed polygons, (k, 2) each, have it inside: an odd number of times."""
-    start = np.concatenate(loops)
-    end = np.concatenate([np.roll(loop, -1, axis=0) for loop in loops])
-    up = (start[None, :, 1] > points[:, None, 1]) != (end[None, :, 1] > points[:, None, 1])
-    with np.errstate(divide="ignore", invalid="ignore"):
-        share = (points[:, None, 1] - start[None, :, 1]) / (end - start)[None, :, 1]
-    x = start[None, :, 0] + share * (end - start)[None, :, 0]
-    return np.asarray(np.sum(up & (x > points[:, None, 0]), axis=1) % 2 == 1)

@@ -16,6 +16,17 @@ Quad = tuple[int, ...]
 Sides = dict[tuple[int, int], Curve]
 
 
+def coons_patch(low: Array, high: Array, left: Array, right: Array, u: Array, v: Array) -> Array:
+    """Return the points (n_u, n_v, d) of a Coons patch at parameters u (n_u,) and v (n_v,).
+
+    low, high: (n_u, d), its points at v = 0 and v = 1. left, right: (n_v, d), those at u = 0 and u = 1. Of control
+    points at the Greville points of knots it is the patch of the splines.
+    """
+    s, t = u[:, None, None], v[None, :, None]
+    ruled = (1 - t) * low[:, None] + t * high[:, None] + (1 - s) * left[None] + s * right[None]
+    return np.asarray(ruled - (1 - s) * ((1 - t) * low[0] + t * high[0]) - s * ((1 - t) * low[-1] + t * high[-1]))
+
+
 def qualities(points: Array, quads: Sequence[Quad], sides: Sides) -> Array:
     """Return the quality of the Coons patch of each quadrangle of points (n, 2): 1 for a rectangle, below 0 for a fold.
 

@@ -1,72 +1,37 @@
 """Lays the profiles of all slabs on each other: the lines between them, cut wherever two meet."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from scipy.spatial import cKDTree
 
 from ...arrays import Array, IntArray
 from ...surface.geometry import connected
-from .stack import Loop, Stack
+from .polygons import cross, straightened
 
 MOST_LINES = 3000  # of all profiles: finer outlines are not worth their time
 
 
-def lines_of(stack: Stack) -> tuple[Array, IntArray] | None:
+def lines_of(profiles: Sequence[Sequence[Array]], near: float) -> tuple[Array, IntArray] | None:
     """Return points (n, 2) and the lines between them (m, 2) that all profiles consist of; None for too many.
 
-    Lines meet at common points alone.
+    Lines meet at common points alone. profiles: of each slab polygons (k, 2). near: nearer points are one.
     """
-    loops = [loop[straightened(loop, stack.near)] for loops in stack.profiles for loop in loops]
+    loops = [loop[straightened(loop, near)] for loops in profiles for loop in loops]
     if any(len(loop) < 3 for loop in loops) or sum(map(len, loops)) > MOST_LINES:
         return None
     points = np.concatenate(loops)
     starts = np.cumsum([0, *map(len, loops)])
     lines = np.concatenate([start + _cycle(len(loop)) for start, loop in zip(starts, loops, strict=False)])
-    points, lines = _welded(points, lines, stack.near)
-    points, lines = _crossed(points, lines, stack.near)
-    points, lines = _welded(points, lines, stack.near)
-    return _welded(*_touched(points, lines, stack.near), stack.near)
+    points, lines = _welded(points, lines, near)
+    points, lines = _crossed(points, lines, near)
+    points, lines = _welded(points, lines, near)
+    return _welded(*_touched(points, lines, near), near)
 
 
 def _cycle(count: int) -> IntArray:
     numbers = np.arange(count)
     return np.stack([numbers, np.roll(numbers, -1)], axis=1)
-
-
-def straightened(loop: Loop, near: float) -> IntArray:
-    """Return the numbers of a polygon's corners (k, 2): not of points that lie on a straight line between others."""
-    turn = int(np.abs(turns_of(loop)).argmax())
-    loop = np.roll(loop, -turn, axis=0)
-    closed = np.concatenate([loop, loop[:1]])
-    kept, first = [0], 0
-    for last in range(2, len(closed)):
-        if _off(closed[first + 1 : last], closed[first], closed[last]).max() > 0.5 * near:
-            first = last - 1
-            kept.append(first)
-    ends = [*kept, len(loop)]
-    for k in range(1, len(kept)):  # a point just beside a corner may have been taken for it
-        first, last = kept[k - 1], ends[k + 1]
-        off = _off(closed[first + 1 : last], closed[first], closed[last])
-        kept[k] = first + 1 + int(np.round(off / near, 6).argmax())
-    return (np.array(kept) + turn) % len(loop)
-
-
-def _off(points: Array, start: Array, end: Array) -> Array:
-    """Return the distances (k,) of points (k, 2) from a line between two points."""
-    along = end - start
-    share = np.clip((points - start) @ along / max(float(along @ along), 1e-300), 0.0, 1.0)
-    return np.asarray(np.linalg.norm(points - start - share[:, None] * along, axis=1))
-
-
-def turns_of(loop: Loop) -> Array:
-    """Return the angle (k,) in radians by which a polygon turns at each corner, positive to the left."""
-    after = np.roll(loop, -1, axis=0) - loop
-    before = np.roll(after, 1, axis=0)
-    return np.arctan2(cross(before, after), np.sum(before * after, axis=-1))
-
-
-def cross(a: Array, b: Array) -> Array:
-    """Return the cross product of vectors in the plane (..., 2)."""
-    return np.asarray(a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0])
 
 
 def _welded(points: Array, lines: IntArray, near: float) -> tuple[Array, IntArray]:

@@ -13,8 +13,8 @@ from scipy.spatial import Delaunay, cKDTree
 from ...arrays import Array
 from .coons import Quad, Sides, qualities
 from .curves import Curve
-from .lines import cross
-from .planar_graph import PlanarGraph, inside_of
+from .planar_graph import PlanarGraph
+from .polygons import cross, edges_of, inside_of
 from .regions import Loop, PlaneRegion, outline
 
 _THICK = 0.5  # of the shorter chord beside a node, and
@@ -114,11 +114,6 @@ class Rim:
         with np.errstate(divide="ignore", invalid="ignore"):
             far, place = cross(gap, self.along) / det, cross(gap, way[None]) / det
         return float(far[(place >= 0.0) & (place <= 1.0) & (far > self.nearest)].min(initial=np.inf))
-
-
-def edges_of(loop: Sequence[int]) -> list[tuple[int, int]]:
-    """Return the pairs of nodes that follow each other in a loop."""
-    return list(zip(loop, (*loop[1:], loop[0]), strict=True))
 
 
 def cut_places(curve: Curve, near: Array) -> list[float]:

@@ -7,8 +7,8 @@ import numpy as np
 
 from ...arrays import Array, IntArray
 from ...surface.features import chains_between, runs_on
-from .lines import cross
 from .plane_warp import PlaneWarp
+from .polygons import cross
 
 WIDEST = np.pi / 2.0 + 0.05  # radians by which a piece turns at most: it becomes an edge of a quadrangle
 SAMPLES = 33  # of a piece, in equal steps of its parameter

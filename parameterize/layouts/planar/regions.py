@@ -1,12 +1,13 @@
 """Finds the regions between curves, and in which slabs each of them belongs to the body."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from ...arrays import Array
-from .planar_graph import PlanarGraph, inside_of
-from .stack import Stack, area_of
+from .planar_graph import PlanarGraph
+from .polygons import area_of, edges_of, inside_of
 
 _ASIDE = 1e-3  # of a line's length: how far from it a point lies that tells on which side the body is
 
@@ -30,8 +31,11 @@ class PlaneRegion:
     solid: tuple[bool, ...]
 
 
-def regions_of(network: PlanarGraph, stack: Stack) -> tuple[PlaneRegion, ...] | None:
-    """Return the regions that belong to the body in some slab; None where a node is met twice by one loop."""
+def regions_of(network: PlanarGraph, profiles: Sequence[Sequence[Array]]) -> tuple[PlaneRegion, ...] | None:
+    """Return the regions that belong to the body in some slab; None if a node is met twice by one loop.
+
+    profiles: of each slab the polygons (k, 2) that bound it.
+    """
     loops = _loops(network)
     if any(len(set(loop)) < len(loop) for loop in loops):
         return None
@@ -48,7 +52,7 @@ def regions_of(network: PlanarGraph, stack: Stack) -> tuple[PlaneRegion, ...] | 
     for k, own in members.items():
         a, b = outlines[k][:2]
         point = 0.5 * (a + b) + _ASIDE * np.array([a[1] - b[1], b[0] - a[0]])
-        solid = tuple(bool(inside_of(profile, point[None])[0]) for profile in stack.profiles)
+        solid = tuple(bool(inside_of(profile, point[None])[0]) for profile in profiles)
         if any(solid):
             found.append(PlaneRegion(tuple(own), solid))
     return tuple(found)
@@ -56,8 +60,7 @@ def regions_of(network: PlanarGraph, stack: Stack) -> tuple[PlaneRegion, ...] | 
 
 def outline(network: PlanarGraph, loop: Loop) -> Array:
     """Return the polygon (k, 2) of the curves of a loop."""
-    edges = zip(loop, loop[1:] + loop[:1], strict=True)
-    return np.concatenate([network.sides[edge].points[:-1] for edge in edges])
+    return np.concatenate([network.sides[edge].points[:-1] for edge in edges_of(loop)])
 
 
 def _loops(network: PlanarGraph) -> list[Loop]:

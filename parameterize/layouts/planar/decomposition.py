@@ -12,18 +12,19 @@ from scipy.optimize import Bounds, LinearConstraint, milp
 from scipy.sparse import csr_array
 
 from ...arrays import Array
-from .candidates import Candidates, CurveCuts, beside, branches_of, candidates_of, cut, cut_places, edges_of, opposite
+from .candidates import Candidates, CurveCuts, beside, branches_of, candidates_of, cut, cut_places, opposite
 from .coons import Quad, Sides, qualities, smoothed
 from .planar_graph import PlanarGraph
 from .plane_warp import PlaneWarp
+from .polygons import edges_of
 from .regions import PlaneRegion, outline
 
-_GAP = 0.02  # relative: a division that costs so little more than the best one is taken
+_GAP = 0.02  # relative: a decomposition that costs so little more than the best one is taken
 _NODES = 200  # of the search, at most
 
 
 @dataclass(frozen=True, eq=False)
-class Division:
+class Decomposition:
     """Quadrangles that fill regions.
 
     Attributes
@@ -38,7 +39,7 @@ class Division:
     inner : tuple of int
         The points that lie inside of regions.
     cost : float
-        By which divisions are compared.
+        By which decompositions are compared.
     """
 
     points: Array
@@ -53,20 +54,20 @@ class Division:
         """Return the quality of the worst quadrangle."""
         return float(qualities(self.points, self.quads, self.sides).min())
 
-    def smoothed(self) -> "Division":
-        """Return the division with its inner points moved."""
+    def smoothed(self) -> "Decomposition":
+        """Return the decomposition with its inner points moved."""
         return replace(self, points=smoothed(self.points, self.quads, self.sides, self.inner))
 
-    def moved(self, field: PlaneWarp) -> "Division":
-        """Return the division of the plane that a field has moved."""
+    def moved(self, field: PlaneWarp) -> "Decomposition":
+        """Return the decomposition of the plane that a field has moved."""
         sides = {edge: curve.moved(field) for edge, curve in self.sides.items()}
         return replace(self, points=field(self.points), sides=sides)
 
 
-def division_of(
+def decomposition_of(
     network: PlanarGraph, regions: Sequence[PlaneRegion], most: int, *, facing: bool = False
-) -> Division | None:
-    """Return the division of regions into quadrangles that costs least; None where there is none.
+) -> Decomposition | None:
+    """Return the decomposition of regions into quadrangles that costs least; None where there is none.
 
     most: blocks, at most, one for each slab of each quadrangle. facing: whether straight sides have optional points
     opposite curved ones, too.
@@ -100,7 +101,7 @@ def division_of(
     picked = [
         (quad, owner) for owner, numbers in enumerate(chosen[0]) for quad in (rows[owner].quads[k] for k in numbers)
     ]
-    return Division(
+    return Decomposition(
         np.array(nodes), tuple(q for q, _ in picked), tuple(o for _, o in picked), sides, tuple(inner), chosen[1]
     )
 
