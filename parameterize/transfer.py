@@ -6,14 +6,10 @@ point of the volume's boundary around it.
 
 import numpy as np
 
-from .arrays import Array
 from .cube.boundary_map import BoundaryMap
-from .cube.cube import axis_and_side
-from .quality.distances import closest_in_faces, nearest_on_boundary
+from .quality.distances import closest_in_faces, nearest_on_boundary, places_near
 from .spline.body import Body
 from .spline.sampled_boundary import SampledBoundary
-from .spline.volume import BSplineVolume
-from .surface.nearest import closest_triangles
 from .surface.surface import Surface
 
 
@@ -28,7 +24,9 @@ def transferred(boundary: BoundaryMap, body: Body, surface: Surface) -> Boundary
     if not body.is_single:
         patches, places, _ = nearest_on_boundary(surface.vertices, body, SampledBoundary.of(body))
         return BoundaryMap(surface.vertices, places, faces, part_faces=faces, groups=groups, patches=patches)
-    parameters = _places(boundary, body.only, surface.vertices)
+    mesh = boundary.vertices, boundary.faces, boundary.parameters, boundary.cube_faces
+    _, places, axis = places_near(surface.vertices, *mesh)
+    parameters, _ = closest_in_faces(surface.vertices, body.only, places, axis)
     return BoundaryMap(
         np.concatenate([surface.vertices, boundary.vertices]),
         np.concatenate([parameters, boundary.parameters]),
@@ -36,13 +34,3 @@ def transferred(boundary: BoundaryMap, body: Body, surface: Surface) -> Boundary
         faces,
         groups,
     )
-
-
-def _places(boundary: BoundaryMap, volume: BSplineVolume, points: Array) -> Array:
-    """Return the places (n, 3) on the cube of points (n, 3) near the mesh of a boundary map."""
-    _, triangle, weights = closest_triangles(points, boundary.vertices, boundary.faces)
-    corners = boundary.faces[triangle]  # (n, 3)
-    places = np.einsum("nk,nka->na", weights, boundary.parameters[corners]).clip(0.0, 1.0)
-    axis, side = axis_and_side(boundary.cube_faces[triangle])
-    places[np.arange(len(points)), axis] = side
-    return closest_in_faces(points, volume, places, axis)[0]

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from parameterize.optimization.matrices import cofactors_and_determinants, dots, least_eigenvalues, squared_norms
+from parameterize.quality.rotations import cofactors_and_determinants, dots, least_eigenvalues, squared_norms
 
 
 def random_matrices(seed=5):

@@ -4,7 +4,7 @@ import pytest
 from bodies import ring
 from patches import cells, frame, plate_with_hole
 
-from parameterize.quality.proved import euler_number
+from parameterize.quality.quality import euler_number
 from parameterize.spline.body import Body
 
 ELL = Body.from_patches(cells([(0, 0, 0), (1, 0, 0), (0, 1, 0)]))

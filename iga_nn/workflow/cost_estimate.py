@@ -115,7 +115,7 @@ def forecast(
 
 
 def _pass_seconds(config: Config, device: str, clock: Clock) -> float:
-    from parameterize.training.effort import a_pass
+    from parameterize.training.network import a_pass
 
     return _fastest(a_pass(config.network, device, PASS_POINTS), clock) * 1000.0 / PASS_POINTS
 

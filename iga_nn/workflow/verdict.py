@@ -8,7 +8,7 @@ from parameterize.arrays import in_brackets
 from parameterize.certificate.body import certify
 from parameterize.certificate.boundary import check_boundary
 from parameterize.compilation import compilation_told
-from parameterize.quality.proved import proved
+from parameterize.quality.quality import proved
 from parameterize.spline.body import BodyLike, as_body
 
 from ..options import MapOptions

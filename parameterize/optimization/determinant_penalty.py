@@ -233,12 +233,9 @@ def _bezier_points(control: Array, first: IntArray, weights: Array) -> Array:
     spans, n = len(first), weights.shape[2]
     points = np.empty((spans, 3, n**3), control.dtype)
     for s in range(spans):
+        u, v, w = first[s]
         for c in range(3):
-            for i in range(n):
-                for j in range(n):
-                    for k in range(n):
-                        point = control[c, first[s, 0] + i, first[s, 1] + j, first[s, 2] + k]
-                        points[s, c, (i * n + j) * n + k] = point
+            points[s, c] = control[c, u : u + n, v : v + n, w : w + n].copy().ravel()
             _along_axes(points[s, c], weights[s, 0], weights[s, 1], weights[s, 2])
     return points
 

@@ -8,10 +8,9 @@ import numpy as np
 from scipy.ndimage import uniform_filter
 
 from ..arrays import Array, Floats, Knots
-from ..quality.rotations import closest_rotations
+from ..quality.rotations import closest_rotations, cofactors_and_determinants, dots, least_eigenvalues, squared_norms
 from ..spline.spline_map import ControlNets
 from ..threads import in_parallel
-from .matrices import cofactors_and_determinants, dots, least_eigenvalues, squared_norms
 from .operators import PiecewiseOperator
 from .tensor_product import SYMMETRIC, GaussGrid
 from .term import Blockwise, RoundWeights

@@ -13,7 +13,7 @@ import numpy as np
 
 from ..arrays import Array, Floats
 from ..cube.cube import axis_and_side
-from .matrices import dots
+from ..quality.rotations import dots
 from .operators import ControlRows, PiecewiseOperator
 from .surface_distance import Correspondence
 from .term import RoundWeights

@@ -57,21 +57,32 @@ def nearest_on_boundary(points: Array, body: BodyLike, boundary: SampledBoundary
     then lower the distance to the spline itself. It is the distance of a point on the spline's boundary, so never less
     than the true one.
     """
-    _, triangle, weights = closest_triangles(points, boundary.points, boundary.triangles)
-    corners = boundary.triangles[triangle]  # (m, 3)
-    where = np.clip(
-        np.einsum("mk,mka->ma", weights, boundary.parameters[corners]), 0.0, 1.0
-    )  # weights sum to 1 roughly
-    axis, _ = axis_and_side(boundary.cube_faces[triangle])
-    every = np.arange(len(points))
-    where[every, axis] = boundary.parameters[corners[:, 0], axis]
-    patches, distances = boundary.patches[corners[:, 0]], np.empty(len(points))
+    triangle, where, axis = places_near(
+        points, boundary.points, boundary.triangles, boundary.parameters, boundary.cube_faces
+    )
+    patches, distances = boundary.patches[boundary.triangles[triangle, 0]], np.empty(len(points))
     for number, patch in enumerate(as_body(body)):
         own = np.flatnonzero(patches == number)
         if not own.size:
             continue
         where[own], distances[own] = closest_in_faces(points[own], patch, where[own], axis[own])
     return patches, where, distances
+
+
+def places_near(
+    points: Array, vertices: Array, triangles: IntArray, parameters: Array, cube_faces: IntArray
+) -> tuple[IntArray, Array, IntArray]:
+    """Return the triangles (m,) of a mesh on faces of a cube that are nearest to points (m, 3), and the places there.
+
+    vertices (n, 3) with parameters (n, 3); triangles (k, 3) on cube_faces (k,). The places are parameters (m, 3), with
+    the directions (m,) that are constant on their faces.
+    """
+    _, triangle, weights = closest_triangles(points, vertices, triangles)
+    # the weights sum to 1 roughly
+    places = np.clip(np.einsum("mk,mka->ma", weights, parameters[triangles[triangle]]), 0.0, 1.0)
+    axis, side = axis_and_side(cube_faces[triangle])
+    places[np.arange(len(points)), axis] = side
+    return triangle, places, axis
 
 
 def closest_in_faces(points: Array, volume: BSplineVolume, start: Array, axis: IntArray) -> tuple[Array, Array]:

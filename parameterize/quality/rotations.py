@@ -1,8 +1,13 @@
-"""Closest rotations of 3 x 3 matrices, so that the distortion needs no singular value decomposition.
+"""Computes closest rotations, cofactors, determinants, norms and least eigenvalues of 3 x 3 matrices.
+
+Matrices have the shape (3, 3, m): row, column, sample. In this layout every operation runs along contiguous memory.
 
 With R the rotation closest to J, the sum of the singular values (the smallest signed with det J) is <R, J>, hence
-ARAP = sum (sigma - 1)^2 = |J - R|^2. The distance |J - R| is stationary in R, so its gradient with R held is exact.
+ARAP = sum (sigma - 1)^2 = |J - R|^2, without a singular value decomposition. The distance |J - R| is stationary in R,
+so its gradient with R held is exact.
 """
+
+import math
 
 import numba
 import numpy as np
@@ -68,3 +73,49 @@ def _polar_factors(matrices: Floats) -> tuple[Floats, Mask]:
                 r[3, i], r[4, i], r[5, i] = left * d + right * cd, left * e + right * ce, left * f + right * cf
                 r[6, i], r[7, i], r[8, i] = left * g + right * cg, left * h + right * ch, left * k + right * ck
     return out, regular
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def cofactors_and_determinants(matrices: Floats) -> tuple[Floats, Floats]:
+    """Return the cofactors (3, 3, m), whose transpose over det J is the inverse of J, and the determinants (m,)."""
+    cofactors = np.empty_like(matrices)
+    for row in range(3):
+        a, b = matrices[(row + 1) % 3], matrices[(row + 2) % 3]
+        for c in range(3):
+            p, q = (c + 1) % 3, (c + 2) % 3
+            for i in range(matrices.shape[2]):
+                cofactors[row, c, i] = a[p, i] * b[q, i] - a[q, i] * b[p, i]
+    return cofactors, dots(matrices[0], cofactors[0])
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def dots(a: Floats, b: Floats) -> Floats:
+    """Return the inner products (m,) of vectors (k, m)."""
+    out = np.zeros(a.shape[1], a.dtype)
+    for c in range(a.shape[0]):
+        for i in range(a.shape[1]):
+            out[i] += a[c, i] * b[c, i]
+    return out
+
+
+def squared_norms(matrices: Floats) -> Floats:
+    """Return the sums (m,) of the squared entries of matrices (3, 3, m)."""
+    flat = matrices.reshape(9, -1)
+    return np.asarray(dots(flat, flat))
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def least_eigenvalues(matrices: Floats) -> Floats:
+    """Return the least eigenvalues (m,) of symmetric matrices (3, 3, m), by the trigonometric formula."""
+    out = np.empty(matrices.shape[2], matrices.dtype)
+    for i in range(out.size):
+        s = matrices[:, :, i]
+        mean = (float(s[0, 0]) + float(s[1, 1]) + float(s[2, 2])) / 3.0
+        a, b, c = s[0, 0] - mean, s[1, 1] - mean, s[2, 2] - mean
+        d, e, f = float(s[1, 2]), float(s[0, 2]), float(s[0, 1])
+        spread = math.sqrt((a * a + b * b + c * c + 2.0 * (d * d + e * e + f * f)) / 6.0)
+        determinant = a * (b * c - d * d) - f * (f * c - d * e) + e * (f * d - b * e)
+        cosine = determinant / max(2.0 * spread**3, 1e-300)
+        angle = math.acos(min(max(cosine, -1.0), 1.0)) / 3.0
+        out[i] = mean + 2.0 * spread * math.cos(angle + 2.0 * math.pi / 3.0)
+    return out

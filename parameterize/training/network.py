@@ -1,6 +1,7 @@
 """Defines the network G: an affine map plus a residual MLP on a positional encoding (section 4.2)."""
 
 import math
+from collections.abc import Callable
 from typing import Any
 
 import torch
@@ -109,3 +110,17 @@ class _InPieces(torch.autograd.Function):
         pairs = list(zip(ctx.pieces, torch.split(gradient, [len(piece) for piece in ctx.pieces]), strict=True))
         parts = in_parallel(part, pairs)
         return None, None, *(sum(of_one[1:], start=of_one[0]) for of_one in zip(*parts, strict=True))
+
+
+def a_pass(config: NetworkConfig, device: str, count: int) -> Callable[[], None]:
+    """Return a function that runs a new network forward and backward on `count` points, on "cpu" or "cuda"."""
+    with torch.random.fork_rng(devices=[]):
+        network = InverseMap(config).to(device)
+    points = torch.full((count, 3), 0.5, device=device)
+
+    def run() -> None:
+        loss = map_in_pieces(network, points).square().sum()
+        loss.backward()  # type: ignore[no-untyped-call]
+        float(loss.detach())  # waits for the device
+
+    return run

@@ -7,6 +7,7 @@ import torch
 from torch import Tensor
 
 from ..arrays import Array, IntArray
+from ..config import TrainConfig
 from ..surface.geometry import normals_and_areas
 from ..surface.solid import Solid
 
@@ -70,3 +71,9 @@ class TriangleSampler:
         ticks = (torch.arange(self._count) + start) / self._count
         picks = torch.searchsorted(self._cumulative, ticks).clamp(max=len(self._cumulative) - 1)
         return picks.to(self._device)
+
+
+def points_of_a_step(vertices: Array, faces: IntArray, train: TrainConfig) -> int:
+    """Return the number of points that the network maps in a step; vertices (n, 3) at volume 1, faces (m, 3)."""
+    nodes = stencils(vertices, faces, train.cell, device=torch.device("cpu"), dtype=torch.float32).nodes
+    return len(nodes) + min(len(vertices), 3 * train.triangles)

@@ -69,7 +69,7 @@ class Network(OneCube):
 
     def cost(self, task: MappingTask) -> Cost:
         """Return the cost of the training and the rounds; of a hard surface that of a growth after the first stage."""
-        from ..training.effort import points_of_a_step  # which loads torch
+        from ..training.samples import points_of_a_step  # which loads torch
 
         config, surface = task.config, task.surface
         points = points_of_a_step(surface.unit_vertices, surface.faces, config.train)
