@@ -145,7 +145,7 @@ class _Spots:
     def of(cls, found: CertifiedMap, fit: Correspondence, course: Course | None = None) -> "_Spots":
         """Measure a map as the report does; course: of the rounds on its knots."""
         spline, nets = found.spline, found.spline.nets
-        gaps = two_sided(spline.body, fit.points, fit.places.triangles)
+        gaps = two_sided(spline.body, fit.points, fit.sliding.triangles)
         distance = gaps.summary().scaled(1.0 / float(np.linalg.norm(np.ptp(fit.points, axis=0))))
         size = nets.shapes[0] if nets.is_single else shared_numbers(nets.shapes, nets.interfaces)[1]
         level = Level(size, distance.rms, distance.max, len(found.unproved))

@@ -312,16 +312,16 @@ def _in_users_units(found: CertifiedMap, fit: Correspondence, task: MappingTask)
     surface, spline = task.surface, found.spline
     if not spline.nets.is_single:
         reassign(fit, spline.control)
-    places = fit.places.at_closest_points(spline.control, fit.points, _LAST_SLIDES, _LAST_SWEEPS)
+    sliding = fit.sliding.at_closest_points(spline.control, fit.points, _LAST_SLIDES, _LAST_SWEEPS)
     unit = spline.body
     body = replace(
         unit, patches=tuple(replace(one, control_points=surface.from_unit(one.control_points)) for one in unit)
     )
     if not body.is_single:
-        where, blocks = places.parameters[: task.own], places.blocks[: task.own]
+        where, blocks = sliding.parameters[: task.own], sliding.blocks[: task.own]
         faces = surface.faces
         boundary = BoundaryMap(surface.vertices, where, faces, part_faces=faces, groups=surface.groups, patches=blocks)
         return body, boundary
     own = np.concatenate([surface.vertices, surface.from_unit(fit.points[task.own :])])
-    boundary = boundary_map(body.only, CubeLayout(own, places.triangles, places.parameters, task.own))
+    boundary = boundary_map(body.only, CubeLayout(own, sliding.triangles, sliding.parameters, task.own))
     return body, replace(boundary, part_faces=surface.faces, groups=surface.groups)

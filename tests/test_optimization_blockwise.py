@@ -51,7 +51,7 @@ def difference(term, control, direction, h=1e-6):
 def test_gradients_of_all_terms_against_finite_differences(name):
     """Without an interface: each control point of each block moves by itself."""
     energy, control = started(name)
-    assert not np.allclose(energy.surface.places.boxes, 1.0, atol=0.1)
+    assert not np.allclose(energy.surface.sliding.boxes, 1.0, atol=0.1)
     assert len(energy.inner) == 3 and len(energy.outer) == 3
     for term in (*energy.inner, *energy.outer):
         value, gradient = term.energy_and_gradient(control)

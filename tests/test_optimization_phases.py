@@ -101,9 +101,9 @@ def cube():
 
 def state_of(control, fit=None, number=4):
     fit = (fit or surface_fit()).on_nets(NETS)
-    places = fit.places.parameters, fit.places.cube_faces
+    parameters = fit.sliding.on_faces
     best = CertifiedMap.of(SplineMap.on_cube(3, KNOTS, control))
-    state = State(SplineEnergy(NETS, fit, Weights()), best.spline, best, places, number=number, halved=2)
+    state = State(SplineEnergy(NETS, fit, Weights()), best.spline, best, parameters, number=number, halved=2)
     state.best_square = fit.mean_square(best.spline.control)
     return state
 
@@ -120,7 +120,7 @@ def test_what_a_polish_folds_is_moved_back_there_and_nowhere_else():
     control = NETS.of_block(kept.spline.control, 0)
     moved_back, moved = (control == start).all(axis=0), (control == better).all(axis=0)
     assert moved_back[2, 2, 2] and moved[9:].all() and bool((moved_back | moved).all())
-    near = (fit.places.parameters < 0.2).all(axis=1)
+    near = (fit.sliding.parameters < 0.2).all(axis=1)
     assert np.all(fit.relaxation[near] == 0.2) and np.median(fit.relaxation) == 0.8  # a quarter near the fold
 
 

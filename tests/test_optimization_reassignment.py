@@ -31,8 +31,8 @@ def test_a_point_gets_the_side_that_faces_as_it_does_though_the_other_is_nearer(
     away = ((goals[:, :2] > 0.1) & (goals[:, :2] < 0.9)).all(axis=1)  # from the rim, where all near samples lie
     sides = away & (np.abs(fit.normals[:, 2]) > 0.99)
     assert sides.sum() == 4 * 7 * 7
-    assert normals_at(spline, fit.places)[sides] == pytest.approx(fit.normals[sides], abs=1e-9)
-    aside = np.abs(fit.places.values(spline.control) - goals)[sides, :2].max(axis=0)
+    assert normals_at(spline, fit.sliding)[sides] == pytest.approx(fit.normals[sides], abs=1e-9)
+    aside = np.abs(fit.sliding.values(spline.control) - goals)[sides, :2].max(axis=0)
     assert (aside <= np.array([1.0 / 48.0, 1.0 / 24.0]) + 1e-12).all()  # half of the samples' distances
 
 
@@ -40,7 +40,7 @@ def test_with_first_all_places_are_new_and_otherwise_those_that_are_close_stay()
     spline = rod(7, lengths=(1.0, 2.0))
     surface = sampled(spline, 8)
     fit = surface_fit(spline, surface.points, surface.triangles)
-    places = fit.places
+    places = fit.sliding
     inside = np.isin(surface.parameters, (0.0, 1.0)).sum(axis=1) == 1  # of a face, on none of its edges
     assert not np.allclose(places.parameters[inside], surface.parameters[inside])  # samples lie in between
     assert np.array_equal(places.cube_faces[inside], surface.sample_faces[inside])
@@ -63,6 +63,6 @@ def test_places_lie_on_faces_of_the_boundary():
     spline = rod(7, lengths=(1.0, 2.0))
     surface = sampled(spline, 6)
     fit = surface_fit(spline, 1.3 * surface.points, surface.triangles)
-    faces, parameters = fit.places.cube_faces, fit.places.parameters
+    faces, parameters = fit.sliding.cube_faces, fit.sliding.parameters
     assert spline.nets.exposed[faces].all()
     assert np.array_equal(parameters[np.arange(len(faces)), faces % 6 // 2], faces % 2)

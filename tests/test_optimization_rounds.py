@@ -111,7 +111,7 @@ def test_the_number_of_threads_changes_no_bit(monkeypatch):
         value, gradient, _ = energy.volume_part(control)
         outer, pulled = energy.surface_part(control)
         direction = energy.newton_direction(control, -(gradient + pulled))
-        found.append((value, outer, gradient, pulled, direction, energy.surface.places.parameters))
+        found.append((value, outer, gradient, pulled, direction, energy.surface.sliding.parameters))
     (value, outer, *arrays), (again, outer_again, *others) = found
     assert value == again and outer == outer_again
     assert all(np.array_equal(a, b) for a, b in zip(arrays, others, strict=True))

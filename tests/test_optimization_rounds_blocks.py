@@ -69,7 +69,7 @@ def test_a_double_torus_with_a_junction_is_certified_and_close():
 def test_the_edges_of_blocks_are_drawn_out_where_the_boundary_meets_itself():
     start, points, faces = torus_start()
     energy = SplineEnergy(start.nets, surface_fit(start, points, faces), Weights())
-    places = energy.surface.places
+    places = energy.surface.sliding
     far = np.roll(places.parameters, len(points) // 2, axis=0), np.roll(places.cube_faces, len(points) // 2)
     places.place(*far)
     assert energy.anchors.energy_and_gradient(start.control)[0] == 0.0

@@ -64,7 +64,7 @@ def refined(first, checkpoints=None, progress=ignore, **options):
 def distance(found, fit):
     """Between the surface and the boundary of F, both ways, over the diagonal."""
     volume = found.spline.volume
-    return two_sided(volume, fit.points, fit.places.triangles).summary().rms / np.linalg.norm(
+    return two_sided(volume, fit.points, fit.sliding.triangles).summary().rms / np.linalg.norm(
         np.ptp(fit.points, axis=0)
     )
 
@@ -94,7 +94,7 @@ def test_knots_are_inserted_until_the_tolerance_is_met(first, once):
     assert found.spline.volume.shape == told.levels[-1].control_points > (6, 6, 6)
     assert told.levels[0].rounds == {} and sum(told.levels[1].rounds.values()) > 0
     assert told.levels[1].seconds.keys() == told.levels[1].rounds.keys() and told.levels[1].ending
-    for row in fit.places.knots:
+    for row in fit.sliding.knots:
         assert set(KNOTS[0]) < set(row)
 
 
@@ -160,7 +160,7 @@ def test_knots_once_chosen_are_those_of_the_checkpoint(first, once, monkeypatch)
     monkeypatch.setattr(refinement, "SHARE", 0.1)
     _, other, again = refined(first, Checkpoints(folder, {}, resume=True), **options)
     assert again == told
-    assert all(np.array_equal(a, b) for a, b in zip(fit.places.knots, other.places.knots, strict=True))
+    assert all(np.array_equal(a, b) for a, b in zip(fit.sliding.knots, other.sliding.knots, strict=True))
 
 
 def test_weights_that_gave_way_are_carried_over(first):
@@ -168,6 +168,6 @@ def test_weights_that_gave_way_are_carried_over(first):
     fit.relax(np.linspace(0.1, 1.0, len(fit.points)))
     finer = tuple(np.sort(np.append(row, 0.1)) for row in KNOTS)
     other = fit.on_nets(ControlNets(3, (finer,)))
-    assert np.array_equal(other.yielding, fit.yielding) and np.array_equal(other.weights, fit.weights)
-    assert np.array_equal(other.places.parameters, fit.places.parameters)
-    assert other.places.knots == finer
+    assert np.array_equal(other.relaxation, fit.relaxation) and np.array_equal(other.weights, fit.weights)
+    assert np.array_equal(other.sliding.parameters, fit.sliding.parameters)
+    assert other.sliding.knots == finer

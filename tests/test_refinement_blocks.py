@@ -72,7 +72,7 @@ def test_knots_are_inserted_into_blocks_until_the_limit_and_the_boundary_comes_c
     assert max(max(shape) for shape in found.spline.nets.shapes) == 6
     assert len({shape[:2] for shape in found.spline.nets.shapes}) == 1  # the directions across are one all around
     assert told.levels[-1].distance < 0.75 * told.levels[0].distance
-    gaps = two_sided(found.spline.body, fit.points, fit.places.triangles).summary()
+    gaps = two_sided(found.spline.body, fit.points, fit.sliding.triangles).summary()
     assert gaps.rms / np.linalg.norm(np.ptp(fit.points, axis=0)) == pytest.approx(told.levels[-1].distance)
     assert f"{size_of(found.spline):,} control points" in str(told.levels[-1])
 

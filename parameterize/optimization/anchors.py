@@ -74,7 +74,7 @@ class Anchors(Correspondence):
     """Hold the anchors as points with fixed parameters; anchors have no effect until `aim` is called."""
 
     def __init__(self, surface: Correspondence) -> None:
-        nets = surface.places.nets
+        nets = surface.sliding.nets
         kinds = (edge_points,) if nets.is_single else (edge_points, face_points)
         points, faces = map(np.concatenate, zip(*(of(nets) for of in kinds), strict=True))
         self._surface, self._share = surface, _EDGES if nets.is_single else _FACES
@@ -88,14 +88,14 @@ class Anchors(Correspondence):
     def aim(self, control: Array) -> None:
         """Set as goals the points of the surface that are nearest to F, with the normals of their triangles."""
         here = self.residuals(control) + self.points
-        points, normals = nearest_on_mesh(here, self._surface.points, self._surface.places.triangles)
+        points, normals = nearest_on_mesh(here, self._surface.points, self._surface.sliding.triangles)
         self.set_goals(points, normals[:, :, None] * normals[:, None, :] + TANGENTIAL * np.eye(3))
 
     def release(self) -> None:
         """Remove all goals but the given corners, until `aim` is called again."""
         points, quadrics = self.points.copy(), np.zeros((len(self.points), 3, 3))
         if (given := self._surface.given_corners) is not None:
-            corner = np.isin(self.places.parameters, (0.0, 1.0)).all(axis=1)  # in the order of the given ones
+            corner = np.isin(self.sliding.parameters, (0.0, 1.0)).all(axis=1)  # in the order of the given ones
             points[corner], quadrics[corner] = given, _GIVEN_CORNER * np.eye(3)
         self.set_goals(points, quadrics)
 

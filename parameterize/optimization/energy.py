@@ -57,7 +57,7 @@ class SplineEnergy:
         """
         nets = self.nets
         knots = tuple((u * a, v * b, w * c) for (u, v, w), (a, b, c) in zip(nets.knots, boxes, strict=True))
-        self.surface.places.measure_in(boxes)
+        self.surface.sliding.measure_in(boxes)
         self.distortion, self.fairness = Distortion(nets, knots), Fairness(nets, knots, self._weights.fairness)
         self.determinants = DeterminantPenalty(nets, knots)
         self.determinants.weigh(span_weights)
@@ -133,12 +133,12 @@ class SplineEnergy:
         """Let the surface's parameters slide towards their closest points, and penalise wrong normals of F there."""
         if self._approach is not None:
             return
-        places, points = self.surface.places, self.surface.points
+        sliding, points = self.surface.sliding, self.surface.points
         if self._grows:
-            places.slide(control, points, keep_layout=True, reach=_REACH)
+            sliding.slide(control, points, keep_layout=True, reach=_REACH)
         else:
-            places.slide(control, points)
-            places.relax(_RELAXATIONS)
+            sliding.slide(control, points)
+            sliding.relax(_RELAXATIONS)
         self.watch_alignment(control)
         if self._contact is not None:
             self._contact = contact_penalty(SplineMap(self.nets, control), near=self._contact.near)
@@ -146,7 +146,7 @@ class SplineEnergy:
     def relax(self, spans: IntArray, factor: float) -> None:
         """Multiply by `factor` the weights of the boundary data in and next to the spans (k, 4) of the map."""
         for fit in (self.surface, self.anchors):
-            fit.relax(np.where(fit.places.near_spans(spans), factor, 1.0) * fit.relaxation)
+            fit.relax(np.where(fit.sliding.near_spans(spans), factor, 1.0) * fit.relaxation)
 
     @property
     def yields(self) -> bool:

@@ -112,13 +112,12 @@ def _look_ahead(found: Point, acceleration: Acceleration, energy: SplineEnergy) 
     """
     if (control := acceleration.guess()) is None:
         return None
-    places = energy.surface.places
-    before = places.parameters, places.cube_faces
+    before = energy.surface.sliding.on_faces
     energy.slide(control)
     ahead = _evaluate(control, energy)
     if ahead.total < found.total:
         return ahead
-    places.place(*before)
+    energy.surface.sliding.place(*before)
     acceleration.forget(keep=1)
     return None
 

@@ -76,12 +76,12 @@ def alignment_penalty(fit: Correspondence, control: Array, floor: float = _FLOOR
 
     The penalty includes points that could fall below the floor in the next step.
     """
-    window = fit.places.window
+    window = fit.sliding.window
     _, tangent_a, tangent_b = window.derivatives(control)
-    _, side = axis_and_side(fit.places.cube_faces)
+    _, side = axis_and_side(fit.sliding.cube_faces)
     outward = side == 1
     normals = np.where(outward, 1.0, -1.0)[:, None] * fit.normals
-    lengths = fit.places.lengths
+    lengths = fit.sliding.lengths
     size = np.einsum("nc,nc->n", np.cross(tangent_a, tangent_b), normals) / (lengths[0] * lengths[1])
     low = size < _MARGIN * floor
     along_a, along_b = window.weights(1, 0) / lengths[0][:, None], window.weights(0, 1) / lengths[1][:, None]

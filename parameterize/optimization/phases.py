@@ -188,11 +188,10 @@ class Polish(Phase):
             mended = CertifiedMap.of(found.spline.with_control(control))
         if mended is found or mended.rank > state.best.rank:
             return found
-        places = energy.surface.places
-        before = places.parameters, places.cube_faces
+        before = energy.surface.sliding.on_faces
         energy.slide(mended.spline.control)
         if energy.surface.mean_square(mended.spline.control) >= state.best_square:
-            places.place(*before)
+            energy.surface.sliding.place(*before)
             return found
         energy.determinants.activate(folded)
         energy.relax(folded, RELAXING)

@@ -31,15 +31,15 @@ def reassign(surface: Correspondence, control: Array, *, first: bool = False) ->
 
     Places that are hardly farther away than that sample stay; with `first`, none does.
     """
-    places = surface.places
-    samples = boundary_samples(SplineMap(places.nets, control), _A_SPAN)
+    sliding = surface.sliding
+    samples = boundary_samples(SplineMap(sliding.nets, control), _A_SPAN)
     chosen = nearest_aligned(samples.points, samples.normals, surface.points, surface.normals)
     present = np.linalg.norm(surface.residuals(control), axis=1)
     closer = np.linalg.norm(samples.points[chosen] - surface.points, axis=1) < _CLOSER * present
     moved = np.ones_like(closer) if first else closer
-    places.place(
-        np.where(moved[:, None], samples.parameters[chosen], places.parameters),
-        np.where(moved, samples.faces[chosen], places.cube_faces),
+    sliding.place(
+        np.where(moved[:, None], samples.parameters[chosen], sliding.parameters),
+        np.where(moved, samples.faces[chosen], sliding.cube_faces),
     )
 
 
@@ -95,14 +95,14 @@ def faces_towards(surface: Correspondence, control: Array) -> Correspondence:
 
     A sample whose goal does not face the same way has no weight.
     """
-    nets = surface.places.nets
+    nets = surface.sliding.nets
     samples = boundary_samples(SplineMap(nets, control), _DRAWN_A_SPAN)
     chosen = nearest_aligned(surface.points, surface.normals, samples.points, samples.normals)
     normals = surface.normals[chosen]
     agrees = (normals * samples.normals).sum(axis=1) > _AGREES
     quadrics = normals[:, :, None] * normals[:, None, :] + TANGENTIAL * np.eye(3)
-    widths = surface.places.boxes.min(axis=1)[samples.faces // 6]
+    widths = surface.sliding.boxes.min(axis=1)[samples.faces // 6]
     distances = np.linalg.norm(surface.points[chosen] - samples.points, axis=1)
     weights = samples.areas * agrees / (1.0 + (distances / (_FAR * widths)) ** 4)
-    places = SlidingParameters(nets, samples.parameters, samples.faces)
-    return Correspondence(places, surface.points[chosen], quadrics, weights / weights.sum())
+    sliding = SlidingParameters(nets, samples.parameters, samples.faces)
+    return Correspondence(sliding, surface.points[chosen], quadrics, weights / weights.sum())

@@ -62,8 +62,7 @@ def optimize(
         if watched is not None:
             energy.determinants.activate(watched)
         first = CertifiedMap.of(start)
-        places = surface.places.parameters, surface.places.cube_faces
-        state = State(energy, start, first, places, number=begun, halved=begun)
+        state = State(energy, start, first, surface.sliding.on_faces, number=begun, halved=begun)
         state.restore(checkpoints, history)
         for phase in schedule.phases:
             while (reason := phase.done(state)) is None and state.number < schedule.rounds:
@@ -73,7 +72,7 @@ def optimize(
             ending = reason or Reason.OUT_OF_ROUNDS
             if ending.ends_the_rounds:
                 break
-        surface.places.place(*state.best_places)
+        surface.sliding.place(*state.best_parameters)
     return state.best, Course(state.rounds, state.seconds, ending)
 
 

@@ -80,6 +80,11 @@ class SlidingParameters:
         return SlidingParameters(nets, self.parameters, self.cube_faces, self.triangles, self.fixed.copy())
 
     @property
+    def on_faces(self) -> tuple[Array, IntArray]:
+        """Return the parameters (N, 3) and their faces (N,), which `place` takes."""
+        return self.parameters, self.cube_faces
+
+    @property
     def blocks(self) -> IntArray:
         """Return the block of each parameter, (N,)."""
         return np.asarray(self.cube_faces // 6)
@@ -116,7 +121,7 @@ class SlidingParameters:
         Points whose distance would grow, and points farther away than `reach`, keep their parameters. With
         `keep_layout`, steps that would flip a triangle are shortened.
         """
-        window, polynomials, before = self.window, self._polynomials, (self.parameters, self.cube_faces)
+        window, polynomials, before = self.window, self._polynomials, self.on_faces
         field = np.ascontiguousarray(control.reshape(3, -1))
         longest = np.array([0.5 / max(shape) for shape in self.nets.shapes])
         edges = next_faces(self.nets), self.boxes
@@ -173,9 +178,9 @@ class SlidingParameters:
         """Turn flipped triangles outwards by small moves of their own points; all other points stay."""
         self._move(unflip(self.parameters, self.triangles, self.still))
 
-    def _move(self, places: Array) -> None:
-        moved = np.abs(places - self.parameters).max(axis=1) > 1e-9
-        self._keep(places, nearest_faces(places), moved)
+    def _move(self, parameters: Array) -> None:
+        moved = np.abs(parameters - self.parameters).max(axis=1) > 1e-9
+        self._keep(parameters, nearest_faces(parameters), moved)
 
     def _keep(self, parameters: Array, cube_faces: IntArray, chosen: Mask) -> None:
         """Set these parameters for the chosen points; the basis functions of the others are not computed again."""

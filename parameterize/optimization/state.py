@@ -26,7 +26,7 @@ class State:
     energy: SplineEnergy
     spline: SplineMap
     best: CertifiedMap
-    best_places: tuple[Array, IntArray]  # the surface's parameters (N, 3) that belong to it, and their faces (N,)
+    best_parameters: tuple[Array, IntArray]  # the surface's parameters (N, 3) that belong to it, and their faces (N,)
     number: int  # of rounds done, those on other knots among them
     halved: int  # the round in which the number of unproved spans was last halved
     certified: bool = False  # whether a round on these knots, one in which F does not grow, has certified the map
@@ -50,8 +50,7 @@ class State:
 
     def keep(self, found: CertifiedMap) -> None:
         """Set a map, with the present parameters of the surface, as the best map."""
-        places = self.energy.surface.places
-        self.best, self.best_places = found, (places.parameters, places.cube_faces)
+        self.best, self.best_parameters = found, self.energy.surface.sliding.on_faces
         self.best_square = self.energy.surface.mean_square(found.spline.control)
 
     def save(self, checkpoints: Checkpoints, history: History) -> None:
@@ -60,10 +59,10 @@ class State:
         arrays = {
             "control": self.spline.control,
             "best": self.best.spline.control,
-            "best_parameters": self.best_places[0],
-            "best_cube_faces": self.best_places[1],
-            "parameters": surface.places.parameters,
-            "cube_faces": surface.places.cube_faces,
+            "best_parameters": self.best_parameters[0],
+            "best_cube_faces": self.best_parameters[1],
+            "parameters": surface.sliding.parameters,
+            "cube_faces": surface.sliding.cube_faces,
             "relaxation": surface.relaxation,
             "anchors": anchors.points,
             "anchors_yielding": anchors.relaxation,
@@ -79,13 +78,13 @@ class State:
             return
         arrays, state = saved
         energy = self.energy
-        energy.surface.places.place(arrays["parameters"], arrays["cube_faces"])
+        energy.surface.sliding.place(arrays["parameters"], arrays["cube_faces"])
         energy.surface.relax(arrays["relaxation"])
         energy.anchors.restore(arrays["anchors"], arrays["anchors_yielding"])
         energy.determinants.weigh(arrays["span_weights"])
         self.spline = self.spline.with_control(arrays["control"])
         self.best = CertifiedMap.of(self.spline.with_control(arrays["best"]))
-        self.best_places = arrays["best_parameters"], arrays["best_cube_faces"]
+        self.best_parameters = arrays["best_parameters"], arrays["best_cube_faces"]
         for name in _NUMBERS:
             setattr(self, name, state[name])
         self.rounds, self.seconds = Counter(state["rounds"]), state["seconds"]

@@ -20,22 +20,22 @@ TANGENTIAL = 2e-4  # share of the distance within the tangent plane: holds slidi
 class Correspondence:
     """Compute the residuals F(p) - v and their energy.
 
-    places: the parameters p. points: (N, 3), the surface points v at volume 1. quadrics: (N, 3, 3). weights: (N,), with
-    sum 1. given_corners: (8, 3), the places that the user gives for the corners of the cube; anchors.py holds F
+    sliding: the parameters p. points: (N, 3), the surface points v at volume 1. quadrics: (N, 3, 3). weights: (N,),
+    with sum 1. given_corners: (8, 3), the places that the user gives for the corners of the cube; anchors.py holds F
     there.
     """
 
     def __init__(
         self,
-        places: SlidingParameters,
+        sliding: SlidingParameters,
         points: Array,
         quadrics: Array,
         weights: Array,
         *,
         given_corners: Array | None = None,
     ) -> None:
-        self.places, self.given_corners = places, given_corners
-        self.normals = vertex_normals(points, places.triangles)
+        self.sliding, self.given_corners = sliding, given_corners
+        self.normals = vertex_normals(points, sliding.triangles)
         self._weights = weights
         self.relaxation = np.ones(len(points))
         self._held = np.zeros(len(points), dtype=bool)
@@ -43,8 +43,8 @@ class Correspondence:
 
     def on_nets(self, nets: ControlNets) -> "Correspondence":
         """Return the same data for blocks with other knots, at the present parameters and weights."""
-        places, given = self.places.on_nets(nets), self.given_corners
-        other = Correspondence(places, self.points, self._quadrics, self._weights, given_corners=given)
+        sliding, given = self.sliding.on_nets(nets), self.given_corners
+        other = Correspondence(sliding, self.points, self._quadrics, self._weights, given_corners=given)
         other.relax(self.relaxation)
         return other
 
@@ -71,17 +71,17 @@ class Correspondence:
 
     def energy_and_gradient(self, control: Array) -> tuple[float, Array]:
         """Return the sum of r^T Q r at the present parameters and its gradient (3, n)."""
-        residual = self.places.rows(control) - self.points  # (N, 3)
+        residual = self.sliding.rows(control) - self.points  # (N, 3)
         pulled = np.einsum("nij,nj->ni", self._metric, residual)
-        return float(np.vdot(residual, pulled)), 2.0 * self.places.rows.adjoint(pulled, control)
+        return float(np.vdot(residual, pulled)), 2.0 * self.sliding.rows.adjoint(pulled, control)
 
     def curvature(self, control: Array) -> PiecewiseOperator:
         """Return the second derivative of the energy for fixed parameters, as an operator in single precision."""
-        return self.places.rows.in_single().squared(2.0 * self._metric.astype(np.float32))
+        return self.sliding.rows.in_single().squared(2.0 * self._metric.astype(np.float32))
 
     def residuals(self, control: Array) -> Array:
         """Return the residuals F(p) - v, (N, 3)."""
-        return self.places.values(control) - self.points
+        return self.sliding.values(control) - self.points
 
     def mean_square(self, control: Array) -> float:
         """Return the mean of |F(p) - v|^2 at the present parameters."""

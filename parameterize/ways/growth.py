@@ -83,7 +83,7 @@ class Growth(OneCube):
         with timed(task.seconds, "fit"), one_blas_thread():
             layout = surface_on_cube(task, self.turn)
             fit = correspondence(task, layout, _COARSE)
-            first = first_cube(layout, fit.places.knots, fit.places.nets.degree)
+            first = first_cube(layout, fit.sliding.knots, fit.sliding.nets.degree)
         return optimized(first, fit, self.schedule(task.config), task, checkpoints, self.weights)
 
     def cost(self, task: MappingTask) -> Cost:

@@ -78,10 +78,10 @@ def first_spline(inside: Array, places: Array, fit: Correspondence) -> SplineMap
         np.full(len(fit.points), _BOUNDARY_SHARE / len(fit.points)),
     ]
     return fit_pairs(
-        np.concatenate([places, fit.places.parameters]),
+        np.concatenate([places, fit.sliding.parameters]),
         np.concatenate([inside, fit.points]),
         np.concatenate(weights),
-        fit.places.knots,
-        fit.places.nets.degree,
+        fit.sliding.knots,
+        fit.sliding.nets.degree,
         fairness=_FAIRNESS,
     )

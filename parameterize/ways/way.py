@@ -52,7 +52,7 @@ class Attempt:
         It is large where the map spans a hollow of the surface, whose points are not far from it.
         """
         samples = boundary_samples(self.found.spline, _A_SPAN)
-        squares = Solid(self.fit.points, self.fit.places.triangles).squared_depths(samples.points)
+        squares = Solid(self.fit.points, self.fit.sliding.triangles).squared_depths(samples.points)
         return math.sqrt(np.average(squares, weights=samples.areas))
 
     @property
