@@ -121,8 +121,15 @@ class Complex:
         np.maximum.at(largest, self.classes, rows)
         return replace(self, class_spans=largest)
 
+    @property
+    def lengths(self) -> Array:
+        """Return the mean lengths (k, 3) of the straight edges of each hexahedron along u, v and w."""
+        corners = self.points[self.hexahedra]
+        rows = [np.linalg.norm(np.diff(corners, axis=1 + axis), axis=-1).mean(axis=(1, 2, 3)) for axis in range(3)]
+        return np.stack(rows, axis=1)
+
     def with_even_spans(self, lengths: Array, spans: int, fewest: int | IntArray = FEWEST_SPANS) -> "Complex":
-        """Return the complex with spans in proportion to the mean lengths (k, 3) of the edges along u, v and w.
+        """Return the complex with spans in proportion to mean lengths (k, 3) of the edges along u, v and w.
 
         spans: of a cube as large as the mean block; along one direction there are at most _LONGEST times as many.
         fewest: in each direction of each hexahedron (k, 3).

@@ -5,7 +5,7 @@ blocks, and each of its edges of edges of blocks.
 """
 
 from ..layouts.complex import Complex, spline_of
-from ..layouts.planes.exact_blocks import exact_blocks, with_spans_across
+from ..layouts.planes.exact_blocks import exact_blocks
 from ..optimization.endings import Reason
 from ..spline.spline_map import SplineMap
 from ..threads import one_blas_thread
@@ -50,5 +50,5 @@ def _exact_blocks(task: MappingTask) -> Complex | None:
     if (blocks := task.fact(("planes", most), find)) is None:
         return None
     if len(blocks) > 1:
-        return with_spans_across(blocks, task.spans_across)
+        return blocks.with_even_spans(blocks.lengths, task.spans_across)
     return blocks.with_spans(spline.control_points - spline.degree)

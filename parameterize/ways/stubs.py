@@ -15,8 +15,7 @@ from ..checkpoint import Checkpoints
 from ..layouts.complex import Complex, control_points
 from ..layouts.rods.along_skeleton import LayoutError
 from ..layouts.rods.clearance import Clearance
-from ..layouts.stubs.cutting import without_handles
-from ..layouts.stubs.pieces import Handle, handles_of
+from ..layouts.stubs.handles import Handle, handles_of, without_handles
 from ..layouts.stubs.stub_blocks import Footprint, footprint, stub_blocks
 from ..optimization.endings import Course
 from ..optimization.reassignment import boundary_samples

@@ -3,7 +3,7 @@
 import numpy as np
 from manifold3d import CrossSection, Manifold
 
-from parameterize.layouts.planes.exact_blocks import exact_blocks, with_spans_across
+from parameterize.layouts.planes.exact_blocks import exact_blocks
 
 
 def box(low, high):
@@ -50,7 +50,7 @@ def arrays(body):
 def blocks_of(vertices, faces, most=None):
     """The exact blocks of a body, six spans across a cube; None where it has none."""
     blocks = exact_blocks(vertices, faces, most)
-    return None if blocks is None else with_spans_across(blocks, 6)
+    return None if blocks is None else blocks.with_even_spans(blocks.lengths, 6)
 
 
 L = [(0, 0), (3, 0), (3, 1), (1, 1), (1, 3), (0, 3)]

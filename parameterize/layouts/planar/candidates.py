@@ -1,4 +1,4 @@
-"""Collects the quadrangles from which the division of a region is chosen, with their corners and sides.
+"""Collects the quadrangles from which the decomposition of a region is chosen, with their corners and sides.
 
 Corners are nodes, optional points on curves, and optional points inside: beside smooth nodes, and where the medial axis
 branches. Sides are parts of curves, and straight lines between points that see each other.
@@ -70,27 +70,27 @@ def branches_of(network: PlanarGraph, region: PlaneRegion) -> Array:
         centers = a + sides / det[:, None]
     radii = np.linalg.norm(centers - a, axis=1)
     fine = np.isfinite(radii) & inside_of([outline(network, loop) for loop in region.loops], np.nan_to_num(centers))
-    found = list[Array]()
+    chosen = list[Array]()
     for k in sorted(
         np.flatnonzero(fine).tolist(), key=lambda k: (-round(float(radii[k]), 6), *np.round(centers[k], 6))
     ):
-        if all(np.linalg.norm(centers[k] - other) > _APART * radii[k] for other in found):
-            found.append(centers[k])
-    return np.array(found).reshape(-1, 2)
+        if all(np.linalg.norm(centers[k] - other) > _APART * radii[k] for other in chosen):
+            chosen.append(centers[k])
+    return np.array(chosen).reshape(-1, 2)
 
 
 def opposite(network: PlanarGraph, region: PlaneRegion) -> Array:
     """Return the points (k, 2) of a region's outline that lie opposite the middles of its curved sides."""
     rim = Rim.of([outline(network, loop) for loop in region.loops])
-    found = []
+    points = []
     for side in (network.sides[edge] for loop in region.loops for edge in edges_of(loop)):
         if not side.is_straight:
             half = side.halves(-1)[1]
             point, (x, y) = half.points[0], half.tangents[0]
             way = np.array([-y, x])
             if np.isfinite(far := rim.across(point, way)):
-                found.append(point + far * way)
-    return np.array(found).reshape(-1, 2)
+                points.append(point + far * way)
+    return np.array(points).reshape(-1, 2)
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,12 +123,12 @@ def cut_places(curve: Curve, near: Array) -> list[float]:
     along = curve.points[1] - curve.points[0]
     feet = (near - curve.points[0]) @ along / (along @ along)
     far = np.linalg.norm(near - curve.points[0] - feet[:, None] * along, axis=1)
-    found = [0.5]
+    places = [0.5]
     for place in feet[np.argsort(np.round(far, 6), kind="stable")]:
-        others = np.array([0.0, 1.0, *found])
-        if len(found) < _MOST_CUTS and np.abs(others - place).min() > _BETWEEN and 0.0 < place < 1.0:
-            found.append(float(place))
-    return sorted(found)
+        others = np.array([0.0, 1.0, *places])
+        if len(places) < _MOST_CUTS and np.abs(others - place).min() > _BETWEEN and 0.0 < place < 1.0:
+            places.append(float(place))
+    return sorted(places)
 
 
 def cut(curve: Curve, places: Sequence[float], nodes: list[Array]) -> CurveCuts:
@@ -157,7 +157,7 @@ def beside(points: Array, loops: Sequence[Loop], sides: Sides, outlines: Sequenc
 
     sides: the curves between points that follow each other. outlines: the polygons of the loops.
     """
-    rim, found = Rim.of(outlines), []
+    rim, inside = Rim.of(outlines), []
     for loop in loops:
         for k, node in enumerate(loop):
             before, after = sides[loop[k - 1], node], sides[node, loop[(k + 1) % len(loop)]]
@@ -167,8 +167,8 @@ def beside(points: Array, loops: Sequence[Loop], sides: Sides, outlines: Sequenc
             way = np.array([-(into + out)[1], (into + out)[0]])
             way /= np.linalg.norm(way)
             chord = min(float(np.linalg.norm(c.points[-1] - c.points[0])) for c in (before, after))
-            found.append(points[node] + min(_THICK * chord, _CLEAR * rim.across(points[node], way)) * way)
-    return found
+            inside.append(points[node] + min(_THICK * chord, _CLEAR * rim.across(points[node], way)) * way)
+    return inside
 
 
 def candidates_of(
@@ -224,7 +224,7 @@ def _lines(
     pairs = pairs[~met]
     pairs = pairs[inside_of(outlines, points[pairs].mean(axis=1))]
     lengths = np.linalg.norm(points[pairs[:, 0]] - points[pairs[:, 1]], axis=1)
-    found, outer = set[tuple[int, int]](), {k for edge in sides for k in edge}
+    shortest, outer = set[tuple[int, int]](), {k for edge in sides for k in edge}
     for k in members:
         own = np.flatnonzero(np.any(pairs == k, axis=1))
         ways = points[pairs[own].sum(axis=1) - k] - points[k]
@@ -237,8 +237,8 @@ def _lines(
             kind = int(sectors[j]), a + b - k in outer
             if kind not in seen:
                 seen.add(kind)
-                found.add((a, b))
-    return found
+                shortest.add((a, b))
+    return shortest
 
 
 def _cycles(tangents: dict[tuple[int, int], tuple[Array, Array]]) -> Iterator[Quad]:

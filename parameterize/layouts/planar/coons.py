@@ -97,5 +97,5 @@ def _worst(points: Array, k: int, tries: Array, own: Sequence[Quad], sides: Side
             else:
                 start, end = (tries if x == k else np.repeat(points[x][None], len(tries), 0) for x in (p, q))
                 rows[:, j, i] = (1.0 - even) * start[:, None] + even * end[:, None]
-    found = qualities_of(rows.reshape(-1, 4, SAMPLES, 2)).reshape(len(tries), len(own))
-    return np.asarray(found.min(axis=1) + 1e-3 * found.mean(axis=1))
+    goodness = qualities_of(rows.reshape(-1, 4, SAMPLES, 2)).reshape(len(tries), len(own))
+    return np.asarray(goodness.min(axis=1) + 1e-3 * goodness.mean(axis=1))

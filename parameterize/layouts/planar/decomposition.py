@@ -149,17 +149,17 @@ def _chosen(
     right = np.array([goals.get(key, 0.0) for key in keys])
     matrix = csr_array((v, (i, j)), shape=(len(keys), column))
     few = csr_array(np.concatenate([*counts, np.zeros(column - first)])[None])
-    found = milp(
+    optimum = milp(
         cost,
         integrality=np.ones(column, dtype=np.int64),
         bounds=Bounds(0.0, 1.0),
         constraints=[LinearConstraint(matrix, right, right), LinearConstraint(few, 0.0, most)],
         options={"mip_rel_gap": _GAP, "node_limit": _NODES},
     )
-    if found.x is None:
+    if optimum.x is None:
         return None
     chosen, start = list[list[int]](), 0
     for row in rows:
-        chosen.append(np.flatnonzero(found.x[start : start + len(row.quads)] > 0.5).tolist())
+        chosen.append(np.flatnonzero(optimum.x[start : start + len(row.quads)] > 0.5).tolist())
         start += len(row.quads)
-    return chosen, float(found.fun)
+    return chosen, float(optimum.fun)

@@ -40,8 +40,8 @@ def _welded(points: Array, lines: IntArray, near: float) -> tuple[Array, IntArra
     label = np.unique(connected(pairs, len(points)), return_inverse=True)[1]
     counts = np.bincount(label).astype(np.float64)
     means = np.stack([np.bincount(label, column) for column in points.T], axis=1) / counts[:, None]
-    found = np.sort(label[lines], axis=1)
-    return means, np.unique(found[found[:, 0] != found[:, 1]], axis=0)
+    pairs = np.sort(label[lines], axis=1)
+    return means, np.unique(pairs[pairs[:, 0] != pairs[:, 1]], axis=0)
 
 
 def _crossed(points: Array, lines: IntArray, near: float) -> tuple[Array, IntArray]:
@@ -60,7 +60,7 @@ def _crossed(points: Array, lines: IntArray, near: float) -> tuple[Array, IntArr
 
 def _touched(points: Array, lines: IntArray, near: float) -> tuple[Array, IntArray]:
     """Return lines cut at the points that lie on them."""
-    found = []
+    pieces = []
     for a, b in lines.tolist():
         along = points[b] - points[a]
         length = float(np.linalg.norm(along))
@@ -68,5 +68,5 @@ def _touched(points: Array, lines: IntArray, near: float) -> tuple[Array, IntArr
         off = np.abs(cross(points - points[a], along)) / length
         on = np.flatnonzero((off <= 2.0 * near) & (place > near) & (place < length - near))
         chain = [a, *on[np.argsort(place[on])].tolist(), b]
-        found += list(zip(chain, chain[1:], strict=False))
-    return points, np.array(found, dtype=np.int64)
+        pieces += list(zip(chain, chain[1:], strict=False))
+    return points, np.array(pieces, dtype=np.int64)

@@ -27,8 +27,8 @@ class PlanarGraph:
     @cached_property
     def sides(self) -> dict[tuple[int, int], Curve]:
         """Return the curves by their two ends, in both directions."""
-        found = {curve.ends: curve for curve in self.curves}
-        return found | {curve.ends[::-1]: curve.reversed for curve in self.curves}
+        sides = {curve.ends: curve for curve in self.curves}
+        return sides | {curve.ends[::-1]: curve.reversed for curve in self.curves}
 
 
 @dataclass(frozen=True)

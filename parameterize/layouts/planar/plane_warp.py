@@ -12,7 +12,7 @@ from ...arrays import Array
 
 _APART = 1.0 / 30.0  # of the largest width: points of long lines at which the smooth field is given
 _MOST = 3000  # of such points: a dense system of equations has them
-_BESIDE = 1e-4  # of the largest width: how far from a point the smooth field tells how a direction is moved
+_BESIDE = 1e-4  # of the largest width: how far from a point the smooth field is taken to move a direction
 
 
 @dataclass(frozen=True, eq=False)

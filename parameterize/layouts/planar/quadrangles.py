@@ -3,6 +3,10 @@
 The polygon is cut into Delaunay triangles, which are matched in pairs, as many as form good quadrangles. Where some are
 left, points in the middle of edges of the polygon are tried, which add triangles; and at last each quadrangle is cut
 into four and each triangle left into three, from its middle.
+
+This integer program is a matching: it maximises the number of pairs. That of decomposition.py covers regions exactly
+once, at the least cost, with quadrangles of many more points, whose sides may be curved: it takes seconds, not
+milliseconds, and adds points beside straight edges, too, so neither gives the blocks of the other.
 """
 
 from collections.abc import Iterator, Sequence
@@ -14,6 +18,7 @@ from scipy.optimize import Bounds, LinearConstraint, milp
 
 from ...arrays import Array
 from ...surface.triangulation import triangulate
+from .polygons import cross, edges_of
 
 LEAST = 0.15  # the sine of the sharpest and of the bluntest angle of a quadrangle that is taken, about nine degrees
 _MOST_TRIED = 40  # sets of points on edges
@@ -48,18 +53,18 @@ class Quadrangles:
 
 
 def quadrangles_of(points: Array, loops: Sequence[Loop]) -> Quadrangles | None:
-    """Return the division of a polygon, points (n, 2), that costs least; None where no division is good enough.
+    """Return the decomposition of a polygon, points (n, 2), that costs least; None if none is good enough.
 
     loops: the outer polygon counterclockwise, those around holes clockwise.
     """
-    found = [one for one in _divisions(points, loops) if one.cost < np.inf]
-    best = min(found, key=lambda one: one.cost, default=None)
+    divided = [one for one in _decompositions(points, loops) if one.cost < np.inf]
+    best = min(divided, key=lambda one: one.cost, default=None)
     return best if best is not None and best.cost * LEAST**2 <= len(best.corners) else None
 
 
-def _divisions(points: Array, loops: Sequence[Loop]) -> Iterator[Quadrangles]:
-    """Yield divisions without points on edges, then with one or two, of long edges first, and one with all divided."""
-    edges = [(a, b) for loop in loops for a, b in zip(loop, loop[1:] + loop[:1], strict=True)]
+def _decompositions(points: Array, loops: Sequence[Loop]) -> Iterator[Quadrangles]:
+    """Yield decompositions without points on edges, then with one or two, of long edges first, and one all divided."""
+    edges = [edge for loop in loops for edge in edges_of(loop)]
     long = sorted(edges, key=lambda edge: -float(np.linalg.norm(points[edge[0]] - points[edge[1]])))
     parity = sum(map(len, loops)) % 2  # of the number of triangles, and so of the points that have to be added
     sets = (chosen for count in range(parity, _MOST_ADDED + 1, 2) for chosen in combinations(long, count))
@@ -78,33 +83,30 @@ def _with_middles(
     """Return points, polygons and parents after the middles of some edges have become points."""
     number = {edge: len(points) + k for k, edge in enumerate(chosen)}
     rows = np.concatenate([points, *(points[list(edge)].mean(axis=0)[None] for edge in chosen)])
-    paths = [
-        tuple(i for a, b in zip(loop, loop[1:] + loop[:1], strict=True) for i in (a, number.get((a, b), -1)) if i >= 0)
-        for loop in loops
-    ]
+    paths = [tuple(i for a, b in edges_of(loop) for i in (a, number.get((a, b), -1)) if i >= 0) for loop in loops]
     return rows, paths, (*((k,) for k in range(len(points))), *chosen)
 
 
 def _triangles(points: Array, loops: Sequence[Loop]) -> list[Triangle]:
     """Return the triangles of a polygon, flipped until none has a better neighbour across an edge."""
     path = list(loops[0])
-    fixed = {frozenset(edge) for loop in loops for edge in zip(loop, loop[1:] + loop[:1], strict=True)}
+    fixed = {frozenset(edge) for loop in loops for edge in edges_of(loop)}
     for hole in sorted(loops[1:], key=lambda loop: -float(points[list(loop), 0].max())):
         path = _bridged(points, path, hole, loops)
     space = np.column_stack([points, np.zeros(len(points))])
-    found = [(int(a), int(b), int(c)) for a, b, c in triangulate(space, [path])]
-    for _ in range(len(found) ** 2):
-        sides = _sides(found)
+    triangles = [(int(a), int(b), int(c)) for a, b, c in triangulate(space, [path])]
+    for _ in range(len(triangles) ** 2):
+        sides = _sides(triangles)
         for edge, (one, other) in sides.items():
             if edge in fixed:
                 continue
-            a, b, c, d = _quadrangle(found[one], found[other], edge)
+            a, b, c, d = _quadrangle(triangles[one], triangles[other], edge)
             if _sine(points[[a, b, c, d]]) > 0.0 and _opposite(points, a, b, c, d) < -1e-9:
-                found[one], found[other] = (a, b, c), (a, c, d)
+                triangles[one], triangles[other] = (a, b, c), (a, c, d)
                 break
         else:
-            return found
-    return found
+            return triangles
+    return triangles
 
 
 def _bridged(points: Array, path: list[int], hole: Loop, loops: Sequence[Loop]) -> list[int]:
@@ -112,35 +114,32 @@ def _bridged(points: Array, path: list[int], hole: Loop, loops: Sequence[Loop]) 
 
     Where rounding makes all lines meet one, the shortest is taken; what does not fill the body then is refused later.
     """
-    edges = [(a, b) for loop in loops for a, b in zip(loop, loop[1:] + loop[:1], strict=True)]
+    edges = [edge for loop in loops for edge in edges_of(loop)]
     lines = sorted(
         (float(np.linalg.norm(points[a] - points[b])), i, k) for i, a in enumerate(path) for k, b in enumerate(hole)
     )
     free = (
         (i, k)
         for _, i, k in lines
-        if not any(_cross(points, path[i], hole[k], c, d) for c, d in edges if not {path[i], hole[k]} & {c, d})
+        if not any(_meet(points, path[i], hole[k], c, d) for c, d in edges if not {path[i], hole[k]} & {c, d})
     )
     i, k = next(free, lines[0][1:])
     return [*path[: i + 1], *hole[k:], *hole[: k + 1], *path[i:]]
 
 
-def _cross(points: Array, a: int, b: int, c: int, d: int) -> bool:
+def _meet(points: Array, a: int, b: int, c: int, d: int) -> bool:
     """Return whether two lines between points meet."""
-    turns = [_turn(points[i], points[j], points[k]) for i, j, k in ((a, b, c), (a, b, d), (c, d, a), (c, d, b))]
-    return turns[0] * turns[1] <= 0.0 and turns[2] * turns[3] <= 0.0
-
-
-def _turn(a: Array, b: Array, c: Array) -> float:
-    """Return twice the area of a triangle, positive where it is counterclockwise."""
-    return float((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]))
+    turns = [
+        cross(points[j] - points[i], points[k] - points[i]) for i, j, k in ((a, b, c), (a, b, d), (c, d, a), (c, d, b))
+    ]
+    return bool(turns[0] * turns[1] <= 0.0 and turns[2] * turns[3] <= 0.0)
 
 
 def _sides(triangles: Sequence[Triangle]) -> dict[frozenset[int], tuple[int, int]]:
     """Return the edges between two triangles with these."""
     owners: dict[frozenset[int], list[int]] = {}
     for number, (a, b, c) in enumerate(triangles):
-        for edge in ((a, b), (b, c), (c, a)):
+        for edge in edges_of((a, b, c)):
             owners.setdefault(frozenset(edge), []).append(number)
     return {edge: (rows[0], rows[1]) for edge, rows in owners.items() if len(rows) == 2}
 
@@ -160,16 +159,15 @@ def _opposite(points: Array, a: int, b: int, c: int, d: int) -> float:
     angles = []
     for corner in (a, c):
         to_b, to_d = points[b] - points[corner], points[d] - points[corner]
-        angles.append(np.arctan2(abs(to_b[0] * to_d[1] - to_b[1] * to_d[0]), to_b @ to_d))
+        angles.append(np.arctan2(abs(cross(to_b, to_d)), to_b @ to_d))
     return float(np.sin(sum(angles)))
 
 
 def _sine(corners: Array) -> float:
     """Return the smallest sine of an angle of a polygon (k, 2), 0 and below where it is not strictly convex."""
     ahead, behind = np.roll(corners, -1, axis=0) - corners, np.roll(corners, 1, axis=0) - corners
-    areas = ahead[:, 0] * behind[:, 1] - ahead[:, 1] * behind[:, 0]
     lengths = np.linalg.norm(ahead, axis=1) * np.linalg.norm(behind, axis=1)
-    return float((areas / np.maximum(lengths, 1e-300)).min())
+    return float((cross(ahead, behind) / np.maximum(lengths, 1e-300)).min())
 
 
 def _matched(points: Array, triangles: list[Triangle]) -> tuple[list[tuple[int, ...]], list[Triangle]]:
@@ -205,9 +203,9 @@ def _all_divided(points: Array, pieces: list[tuple[int, ...]], border: set[tuple
             parents.append(corners if {corners, corners[::-1]} & border else ())  # type: ignore[arg-type]
         return numbers[key]
 
-    found = [
+    quadrangles = [
         (b, middle(b, c), middle(*piece), middle(a, b))
         for piece in pieces
         for a, b, c in zip(piece[-1:] + piece[:-1], piece, piece[1:] + piece[:1], strict=True)
     ]
-    return Quadrangles(np.array(rows), tuple(found), tuple(parents))
+    return Quadrangles(np.array(rows), tuple(quadrangles), tuple(parents))

@@ -9,7 +9,7 @@ from ...arrays import Array
 from .planar_graph import PlanarGraph
 from .polygons import area_of, edges_of, inside_of
 
-_ASIDE = 1e-3  # of a line's length: how far from it a point lies that tells on which side the body is
+_ASIDE = 1e-3  # of a line's length: how far from it a point lies by which the side of the body is known
 
 
 Loop = tuple[int, ...]  # nodes
@@ -48,14 +48,14 @@ def regions_of(network: PlanarGraph, profiles: Sequence[Sequence[Array]]) -> tup
             around = [j for j in members if not set(loops[j]) & set(loops[k]) and inside_of([outlines[j]], point)[0]]
             if around:
                 members[min(around, key=lambda j: areas[j])].append(loops[k])
-    found = []
+    regions = []
     for k, own in members.items():
         a, b = outlines[k][:2]
         point = 0.5 * (a + b) + _ASIDE * np.array([a[1] - b[1], b[0] - a[0]])
         solid = tuple(bool(inside_of(profile, point[None])[0]) for profile in profiles)
         if any(solid):
-            found.append(PlaneRegion(tuple(own), solid))
-    return tuple(found)
+            regions.append(PlaneRegion(tuple(own), solid))
+    return tuple(regions)
 
 
 def outline(network: PlanarGraph, loop: Loop) -> Array:
@@ -71,7 +71,7 @@ def _loops(network: PlanarGraph) -> list[Loop]:
         leaving.setdefault(a, []).append((float(np.arctan2(along[1], along[0])), b))
     turn = {a: [b for _, b in sorted(rows)] for a, rows in leaving.items()}
     left = {(a, b) for a, rows in turn.items() for b in rows}
-    found = []
+    loops = []
     for start in sorted(left):
         if start not in left:
             continue
@@ -81,5 +81,5 @@ def _loops(network: PlanarGraph) -> list[Loop]:
             path.append(step[0])
             rows = turn[step[1]]
             step = step[1], rows[rows.index(step[0]) - 1]
-        found.append(tuple(path))
-    return found
+        loops.append(tuple(path))
+    return loops

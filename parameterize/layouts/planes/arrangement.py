@@ -12,6 +12,7 @@ import numpy as np
 
 from ...arrays import Array
 from ...surface.solid import Solid
+from ..planar.polygons import edges_of
 from .polyhedron import Polyhedron
 
 NEAR = 1e-5  # of the diagonal: points this near to a plane lie in it, and this near to a vertex are the vertex
@@ -57,8 +58,8 @@ def arrangement_of(body: Polyhedron, beside: Beside | None = None) -> Arrangemen
     normals, offsets = _different_planes(body)
     count = len(normals)
     if beside is not None:
-        found = _upright(body) if beside == "upright" else _waist_planes(body)
-        for normal, offset in found:
+        planes = _upright(body) if beside == "upright" else _waist_planes(body)
+        for normal, offset in planes:
             normals, offsets = _with(body, normals, offsets, normal, offset)
         if len(normals) == count:
             return None
@@ -118,7 +119,7 @@ def _waist_planes(body: Polyhedron) -> Iterator[tuple[Array, float]]:
         beside.setdefault(a, []).append((b, {one, other}))
         beside.setdefault(b, []).append((a, {one, other}))
     crowded = np.array([vertex for vertex in body.corners.tolist() if len(beside.get(vertex, ())) >= 4], dtype=np.int64)
-    found = []
+    candidates = []
     for corner in crowded.tolist():
         for (b, faces), (c, others) in combinations(beside[corner], 2):
             normal = np.cross(body.vertices[b] - body.vertices[corner], body.vertices[c] - body.vertices[corner])
@@ -127,9 +128,9 @@ def _waist_planes(body: Polyhedron) -> Iterator[tuple[Array, float]]:
                 offset = float(normal @ body.vertices[corner])
                 near = np.abs(body.vertices[crowded] @ normal - offset) < NEAR * body.diagonal
                 parallel = bool(np.abs(body.planes.normals @ normal).max() > 1.0 - _PARALLEL)
-                found.append((int(near.sum()), parallel, normal, offset, set(crowded[near].tolist())))
+                candidates.append((int(near.sum()), parallel, normal, offset, set(crowded[near].tolist())))
     left = set(crowded.tolist())
-    for *_, normal, offset, own in sorted(found, key=lambda row: row[:2], reverse=True):
+    for *_, normal, offset, own in sorted(candidates, key=lambda row: row[:2], reverse=True):
         if own & left:
             left -= own
             yield normal, offset
@@ -152,18 +153,18 @@ def _cut(points: Array, cells: list[Cell], plane: int, heights: Array, near: flo
     def crossing(a: int, b: int) -> int:
         return crossings.setdefault((min(a, b), max(a, b)), len(points) + len(crossings))
 
-    found: list[Cell] = []
+    parts: list[Cell] = []
     for cell in cells:
         own = {signs[i] for _, ids in cell for i in ids}
         if own >= {-1, 1}:
-            found += [_half(cell, plane, side, signs, crossing, len(points)) for side in (-1, 1)]
+            parts += [_half(cell, plane, side, signs, crossing, len(points)) for side in (-1, 1)]
         else:
-            found.append(cell)
+            parts.append(cell)
     if not crossings:
-        return points, found
+        return points, parts
     a, b = np.array(list(crossings)).T
     share = (heights[a] / (heights[a] - heights[b]))[:, None]
-    return np.concatenate([points, (1.0 - share) * points[a] + share * points[b]]), found
+    return np.concatenate([points, (1.0 - share) * points[a] + share * points[b]]), parts
 
 
 def _half(cell: Cell, plane: int, side: int, signs: list[int], crossing: Callable[[int, int], int], known: int) -> Cell:
@@ -174,7 +175,7 @@ def _half(cell: Cell, plane: int, side: int, signs: list[int], crossing: Callabl
     facets, rim = list[Facet](), dict[int, int]()
     for owner, ids in cell:
         kept = list[int]()
-        for i, j in zip(ids, ids[1:] + ids[:1], strict=True):
+        for i, j in edges_of(ids):
             if signs[i] * side >= 0:
                 kept.append(i)
             if signs[i] * signs[j] < 0:
@@ -182,7 +183,7 @@ def _half(cell: Cell, plane: int, side: int, signs: list[int], crossing: Callabl
         if not any(i < known and signs[i] for i in kept):
             continue
         facets.append((owner, tuple(kept)))
-        for i, j in zip(kept, kept[1:] + kept[:1], strict=True):
+        for i, j in edges_of(kept):
             if all(k >= known or signs[k] == 0 for k in (i, j)):
                 rim[j] = i
     ring = [next(iter(rim))]

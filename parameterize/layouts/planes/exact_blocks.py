@@ -53,16 +53,6 @@ def _decompositions(body: Polyhedron, most: int) -> Iterator[Complex]:
             yield parts
 
 
-def with_spans_across(blocks: Complex, spans: int) -> Complex:
-    """Return hexahedra with spans along their edges that are about equally long.
-
-    spans: across a block that is a cube.
-    """
-    corners = blocks.points[blocks.hexahedra]
-    sizes = [np.linalg.norm(np.diff(corners, axis=1 + axis), axis=-1).mean(axis=(1, 2, 3)) for axis in range(3)]
-    return blocks.with_even_spans(np.stack(sizes, axis=1), spans)
-
-
 def _fills(blocks: Complex, body: Polyhedron) -> bool:
     """Return whether the volume and the outer area of blocks are those of a body, so that no faces are left unglued."""
     volume = signed_volume(body.vertices, body.triangles)

@@ -7,6 +7,7 @@ import numpy as np
 
 from ...arrays import Array, IntArray
 from ..complex import Complex
+from ..planar.polygons import edges_of
 from .sheets import ConvexCell
 
 
@@ -74,12 +75,7 @@ def _cube(cell: ConvexCell) -> IntArray | None:
 
 def _mates(bottom: tuple[int, ...], faces: Sequence[tuple[int, ...]]) -> dict[int, int]:
     """Return for each corner of a face the other end of the edge that leaves the face there."""
-    return {
-        a: b
-        for face in faces
-        for a, b in zip(face, face[1:] + face[:1], strict=True)
-        if a in bottom and b not in bottom
-    }
+    return {a: b for face in faces for a, b in edges_of(face) if a in bottom and b not in bottom}
 
 
 def column(bottom: Sequence[int], mates: dict[int, int]) -> IntArray:

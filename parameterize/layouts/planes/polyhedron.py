@@ -8,6 +8,7 @@ import numpy as np
 from ...arrays import Array, IntArray
 from ...surface.geometry import directed_edges, edge_triangles
 from ...surface.planes import Planes, planes_of
+from ..planar.polygons import edges_of
 
 MOST_FACES = 64  # of a body that is divided along its planes: a tessellated curved surface has more
 
@@ -42,12 +43,7 @@ class Polyhedron:
     @property
     def edges(self) -> list[tuple[int, int, int, int]]:
         """Return two faces at each edge and its two ends, in the order in which the first face runs through them."""
-        sides = {
-            (a, b): number
-            for number, loops in enumerate(self.loops)
-            for loop in loops
-            for a, b in zip(loop, loop[1:] + loop[:1], strict=True)
-        }
+        sides = {(a, b): number for number, loops in enumerate(self.loops) for loop in loops for a, b in edges_of(loop)}
         return [(face, sides[b, a], a, b) for (a, b), face in sides.items() if a < b and (b, a) in sides]
 
     @cached_property

@@ -9,6 +9,7 @@ import numpy as np
 
 from ...arrays import Array
 from ..complex import Complex
+from ..planar.polygons import edges_of
 from ..planar.quadrangles import Quadrangles, quadrangles_of
 from .hexahedra import column
 from .polyhedron import Polyhedron
@@ -48,7 +49,7 @@ def _ends(body: Polyhedron) -> Iterator[tuple[int, dict[int, int]]]:
                 pairs = {
                     (a, b) if a in members[low] else (b, a)
                     for row in rows
-                    for a, b in zip(row, row[1:] + row[:1], strict=True)
+                    for a, b in edges_of(row)
                     if (a in members[low]) != (b in members[low])
                 }
                 if len(pairs) == len(members[low]) == len({a for a, _ in pairs}):

@@ -13,6 +13,7 @@ import numpy as np
 
 from ...arrays import Array, IntArray
 from ...surface.geometry import connected
+from ..planar.polygons import edges_of
 from .arrangement import Arrangement, Facet
 
 _LEAST = 1e-300  # divides lengths of facets that rounding has left without area: they have no direction
@@ -35,11 +36,11 @@ class ConvexCell:
         return sorted({corner for face in self.faces for corner in face})
 
 
-def merged_cells(found: Arrangement) -> tuple[ConvexCell, ...] | None:
+def merged_cells(arrangement: Arrangement) -> tuple[ConvexCell, ...] | None:
     """Return the cells merged across all sheets that can go; None where facets then do not lie on each other whole."""
     owners: dict[frozenset[int], list[tuple[int, int]]] = defaultdict(list)
     rings: dict[frozenset[int], tuple[int, ...]] = {}
-    for number, cell in enumerate(found.cells):
+    for number, cell in enumerate(arrangement.cells):
         for plane, ids in cell:
             owners[frozenset(ids)].append((number, plane))
             rings[frozenset(ids)] = ids
@@ -48,27 +49,29 @@ def merged_cells(found: Arrangement) -> tuple[ConvexCell, ...] | None:
     outer = [key for key in keys if len(owners[key]) == 1]
     facets, between = ([(owners[key][0][1], rings[key]) for key in keys] for keys in (outer, inner))
     sheets = _sheets(between)
-    waists = {int(sheet) for (plane, _), sheet in zip(between, sheets, strict=True) if plane >= found.waist_planes}
-    kept = waists | _kept(found, facets, between, sheets)
+    waists = {
+        int(sheet) for (plane, _), sheet in zip(between, sheets, strict=True) if plane >= arrangement.waist_planes
+    }
+    kept = waists | _kept(arrangement, facets, between, sheets)
     links = [[cell for cell, _ in owners[key]] for k, key in enumerate(inner) if int(sheets[k]) not in kept]
-    group = connected(np.array(links, dtype=np.int64).reshape(-1, 2), len(found.cells))
+    group = connected(np.array(links, dtype=np.int64).reshape(-1, 2), len(arrangement.cells))
     faces: dict[int, dict[int, list[tuple[tuple[int, ...], int]]]] = defaultdict(lambda: defaultdict(list))
-    for number, cell in enumerate(found.cells):
+    for number, cell in enumerate(arrangement.cells):
         for plane, ids in cell:
             beyond = [int(group[other]) for other, _ in owners[frozenset(ids)] if other != number]
             other = beyond[0] if beyond else -1
             if other != group[number]:
                 faces[int(group[number])][plane].append((ids, other))
-    cells = [_cell(found, rows) for rows in faces.values()]
+    cells = [_cell(arrangement, rows) for rows in faces.values()]
     return None if any(cell is None for cell in cells) else tuple(cell for cell in cells if cell is not None)
 
 
 def _edges(ids: tuple[int, ...]) -> list[Edge]:
     """Return the edges of a facet, each pair ascending."""
-    return [(min(a, b), max(a, b)) for a, b in zip(ids, ids[1:] + ids[:1], strict=True)]
+    return [(min(a, b), max(a, b)) for a, b in edges_of(ids)]
 
 
-def _kept(found: Arrangement, outer: list[Facet], inner: list[Facet], sheets: IntArray) -> set[int]:
+def _kept(arrangement: Arrangement, outer: list[Facet], inner: list[Facet], sheets: IntArray) -> set[int]:
     """Return the sheets that have to stay: without any one of them an angle at a re-entrant edge is too large.
 
     The others go one by one, first that which leaves the smallest angles, then that which is least at right angles to
@@ -76,19 +79,21 @@ def _kept(found: Arrangement, outer: list[Facet], inner: list[Facet], sheets: In
 
     outer, inner: the facets on the body's boundary and inside. sheets: that of each facet inside.
     """
-    normals = [_normal(found.points[list(ids)]) for _, ids in outer]
+    normals = [_normal(arrangement.points[list(ids)]) for _, ids in outer]
     at, meeting = _by_edge(outer), _by_edge(inner)
     fans: dict[Edge, list[tuple[int, float]]] = {}
     squareness: dict[int, float] = defaultdict(lambda: 1.0)
     for edge, numbers in at.items():
-        fan = _fan(found, edge, [(outer[number], normals[number]) for number in numbers])
+        fan = _fan(arrangement, edge, [(outer[number], normals[number]) for number in numbers])
         for k in meeting.get(edge, ()) if fan is None else ():
-            sines = [float(np.linalg.norm(np.cross(found.normals[inner[k][0]], normals[number]))) for number in numbers]
+            sines = [
+                float(np.linalg.norm(np.cross(arrangement.normals[inner[k][0]], normals[number]))) for number in numbers
+            ]
             squareness[int(sheets[k])] = min(squareness[int(sheets[k])], *sines)
         if fan is not None:
             start, turn = fan
             fans[edge] = [(-1, 0.0), (-1, turn)] + [
-                (int(sheets[k]), _angle(found, edge, inner[k][1], start)) for k in meeting.get(edge, ())
+                (int(sheets[k]), _angle(arrangement, edge, inner[k][1], start)) for k in meeting.get(edge, ())
             ]
     kept = {sheet for fan in fans.values() for sheet, _ in fan if sheet >= 0}
     around = {sheet: [fan for fan in fans.values() if any(own == sheet for own, _ in fan)] for sheet in kept}
@@ -107,38 +112,40 @@ def _kept(found: Arrangement, outer: list[Facet], inner: list[Facet], sheets: In
 
 def _by_edge(facets: list[Facet]) -> dict[Edge, list[int]]:
     """Return the numbers of the facets at each edge."""
-    found: dict[Edge, list[int]] = defaultdict(list)
+    numbers: dict[Edge, list[int]] = defaultdict(list)
     for number, (_, ids) in enumerate(facets):
         for edge in _edges(ids):
-            found[edge].append(number)
-    return found
+            numbers[edge].append(number)
+    return numbers
 
 
-def _fan(found: Arrangement, edge: Edge, faces: list[tuple[Facet, Array]]) -> tuple[tuple[Array, Array], float] | None:
+def _fan(
+    arrangement: Arrangement, edge: Edge, faces: list[tuple[Facet, Array]]
+) -> tuple[tuple[Array, Array], float] | None:
     """Return two directions across a re-entrant edge, and the angle of the body there; None for any other edge.
 
     Angles are measured from the first direction, which lies in a face, to the second one, which leads into the body.
     faces: those of the body at the edge, with their outward normals. Where four faces meet no angle is too large.
     """
     (first, normal), (last, _) = faces[0], faces[-1]
-    start = _across(found, edge, first[1]), -normal
-    turn = _angle(found, edge, last[1], start)
+    start = _across(arrangement, edge, first[1]), -normal
+    turn = _angle(arrangement, edge, last[1], start)
     if len(faces) != 2:
         return start, 2.0 * np.pi * len(faces)
     return (start, turn) if first[0] != last[0] and turn > np.pi + _STRAIGHT else None
 
 
-def _across(found: Arrangement, edge: Edge, ids: tuple[int, ...]) -> Array:
+def _across(arrangement: Arrangement, edge: Edge, ids: tuple[int, ...]) -> Array:
     """Return the unit vector (3,) in a facet that leads away from one of its edges."""
-    along = found.points[edge[1]] - found.points[edge[0]]
-    away = found.points[list(ids)].mean(axis=0) - found.points[edge[0]]
+    along = arrangement.points[edge[1]] - arrangement.points[edge[0]]
+    away = arrangement.points[list(ids)].mean(axis=0) - arrangement.points[edge[0]]
     away = away - (away @ along) / max(float(along @ along), _LEAST) * along
     return np.asarray(away / max(float(np.linalg.norm(away)), _LEAST))
 
 
-def _angle(found: Arrangement, edge: Edge, ids: tuple[int, ...], start: tuple[Array, Array]) -> float:
+def _angle(arrangement: Arrangement, edge: Edge, ids: tuple[int, ...], start: tuple[Array, Array]) -> float:
     """Return the angle, from 0 to 2 pi, by which a facet at an edge is turned from a first direction to a second."""
-    away = _across(found, edge, ids)
+    away = _across(arrangement, edge, ids)
     return float(np.arctan2(away @ start[1], away @ start[0]) % (2.0 * np.pi))
 
 
@@ -163,7 +170,7 @@ def _sheets(inner: list[Facet]) -> IntArray:
     return connected(np.array(links, dtype=np.int64).reshape(-1, 2), len(inner))
 
 
-def _cell(found: Arrangement, faces: dict[int, list[tuple[tuple[int, ...], int]]]) -> ConvexCell | None:
+def _cell(arrangement: Arrangement, faces: dict[int, list[tuple[tuple[int, ...], int]]]) -> ConvexCell | None:
     """Return a merged cell from the facets in each of its planes, with the cells beyond (-1: outside).
 
     None is returned where two cells share one of its faces, or a cell and the outside.
@@ -175,13 +182,13 @@ def _cell(found: Arrangement, faces: dict[int, list[tuple[tuple[int, ...], int]]
         for ids, _ in facets:
             for i in ids:
                 planes_at[i].add(plane)
-    middle = found.points[list(planes_at)].mean(axis=0)
+    middle = arrangement.points[list(planes_at)].mean(axis=0)
     rings = []
     for facets in faces.values():
         corners = sorted({i for ids, _ in facets for i in ids if len(planes_at[i]) >= 3})
         if len(corners) < 3:
             return None
-        rings.append(_around(found.points, corners, middle))
+        rings.append(_around(arrangement.points, corners, middle))
     return ConvexCell(tuple(rings))
 
 

@@ -69,22 +69,22 @@ class Exit:
 
 def junction(skeleton: Skeleton, node: int, room: Clearance, size: float) -> Junction:
     """Return the block at a node of three to six branches. size: a factor of its widths."""
-    ends, found = junction_at(skeleton, node)
+    ends, assignment = junction_at(skeleton, node)
     center, radius = skeleton.nodes[node], float(skeleton.radii[node])
-    free = np.setdiff1d(np.arange(len(NORMALS)), found.faces)
+    free = np.setdiff1d(np.arange(len(NORMALS)), assignment.faces)
     reach = np.full(len(NORMALS), FLAT * radius)
-    ways = NORMALS[free] @ found.axes
+    ways = NORMALS[free] @ assignment.axes
     reach[free] = np.minimum(
         room.body.rays(center, ways), np.maximum(reach[free], room.rays(np.tile(center, (len(ways), 1)), ways))
     )
-    for (i, _), face in zip(ends, found.faces, strict=True):
+    for (i, _), face in zip(ends, assignment.faces, strict=True):
         reach[face] = min(reach[face], _SHARE / THIN * skeleton.branches[i].length)
     half = size * THIN * reach.reshape(3, 2).min(axis=1)
     exits = {
         end: _exit(stub(skeleton.branches[end[0]], end[1]), FACE_NAMES[face], center, float(half[face // 2]))
-        for end, face in zip(ends, found.faces.tolist(), strict=True)
+        for end, face in zip(ends, assignment.faces.tolist(), strict=True)
     }
-    return Junction(center, found.axes, half, exits)
+    return Junction(center, assignment.axes, half, exits)
 
 
 def _exit(points: Array, face: str, center: Array, distance: float) -> Exit:

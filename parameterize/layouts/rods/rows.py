@@ -98,14 +98,14 @@ def _hubs(skeleton: Skeleton) -> list[IntArray]:
 def _limbs(skeleton: Skeleton, hub: IntArray) -> list[_Limb]:
     """Return the limbs that leave a hub; their distances are those from its thickest node."""
     deep = skeleton.nodes[hub[np.argmax(skeleton.radii[hub])]]
-    found = []
+    limbs = []
     for node in hub.tolist():
         for number, end in branch_ends(skeleton, node):
             branch = skeleton.branches[number]
             if skeleton.degrees[branch.ends[1 - end]] == 1:
                 points = stub(branch, end)
-                found.append(_Limb((number, end), points, np.linalg.norm(points[0] - deep) + arc_lengths(points)))
-    return found
+                limbs.append(_Limb((number, end), points, np.linalg.norm(points[0] - deep) + arc_lengths(points)))
+    return limbs
 
 
 def _row(limbs: list[_Limb], radius: float, body: Solid) -> list[tuple[_Limb, float]]:

@@ -1,1 +1,1 @@
-"""Divides a stack of extrusions, whose outlines may be curved, into columns of blocks over a plane division."""
+"""Divides a stack of extrusions, whose outlines may be curved, into blocks over a plane decomposition."""

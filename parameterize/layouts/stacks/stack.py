@@ -74,9 +74,9 @@ def stack_of(vertices: Array, faces: IntArray) -> Stack | None:
             tuple(_profile(vertices @ frame.T, faces, low, high))
             for low, high in zip(heights, heights[1:], strict=False)
         )
-        found = Stack(frame, heights, profiles, near)
-        if abs(found.volume - volume) <= SAME * volume:
-            return found
+        stack = Stack(frame, heights, profiles, near)
+        if abs(stack.volume - volume) <= SAME * volume:
+            return stack
     return None
 
 
@@ -107,8 +107,8 @@ def _levels(vertices: Array, faces: IntArray, axis: Array, near: float) -> Array
     widths = np.abs(doubled_areas(vertices, faces) @ axis) / np.maximum(sides, 1e-300)  # seen along the axis
     if not np.any(across) or np.any(~across & (widths > near)):
         return None
-    found = np.sort(heights[faces[across]].ravel())
-    groups = np.split(found, np.flatnonzero(np.diff(found) > near) + 1)
+    levels = np.sort(heights[faces[across]].ravel())
+    groups = np.split(levels, np.flatnonzero(np.diff(levels) > near) + 1)
     return np.array([row.mean() for row in groups]) if 2 <= len(groups) <= MOST_SLABS + 1 else None
 
 

@@ -54,8 +54,8 @@ def tapered_stack_of(vertices: Array, faces: IntArray, sharp: float = SHARP) -> 
         if slabs is None or abs(sum(slab.volume for slab in slabs) - volume) > SAME * volume:
             continue
         sides = _sides(slabs, near)
-        if _rims_are_sharp(slabs, sides, sharp) and (found := _upright(slabs, sides, frame, near)) is not None:
-            return found
+        if _rims_are_sharp(slabs, sides, sharp) and (stack := _upright(slabs, sides, frame, near)) is not None:
+            return stack
     return None
 
 
@@ -84,7 +84,7 @@ def _width(loop: Loop) -> float:
 
 def _ruled(points: Array, faces: IntArray, low: float, high: float, near: float) -> list[tuple[Loop, Loop]]:
     """Return the corners of each loop at two heights without vertices between them: the same sides are cut at both."""
-    found = []
+    loops = []
     for edges in section(points, faces, 0.5 * (low + high)):
         a, b = points[edges[:, 0]], points[edges[:, 1]]
         ends = []
@@ -92,8 +92,8 @@ def _ruled(points: Array, faces: IntArray, low: float, high: float, near: float)
             share = ((height - a[:, 2]) / (b[:, 2] - a[:, 2]))[:, None]
             ends.append((1.0 - share) * a[:, :2] + share * b[:, :2])
         kept = straightened(ends[1], near)
-        found.append((ends[0][kept], ends[2][kept]))
-    return found
+        loops.append((ends[0][kept], ends[2][kept]))
+    return loops
 
 
 def _as_one(below: _Slab, above: _Slab, near: float) -> _Slab | None:
@@ -161,12 +161,12 @@ def _sides(slabs: Sequence[_Slab], near: float) -> list[Side]:
         left = list(slab.loops)
         going: list[Side] = []
         for side in open_:
-            found = _following(side[-1][1][1], [loop[0] for loop in left], near)
-            if found is None:
+            above = _following(side[-1][1][1], [loop[0] for loop in left], near)
+            if above is None:
                 done.append(side)
                 continue
-            low, high = left.pop(found[0])
-            going.append([*side, (k, (low[found[1]], high[found[1]]))])
+            low, high = left.pop(above[0])
+            going.append([*side, (k, (low[above[1]], high[above[1]]))])
         open_ = going + [[(k, loops)] for loops in left]
     return done + open_
 

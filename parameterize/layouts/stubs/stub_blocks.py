@@ -13,7 +13,7 @@ from ..rods.along_skeleton import LayoutError
 from ..rods.clearance import Clearance
 from ..rods.frames import arc_lengths, at_lengths
 from ..rods.rods import quarter_turns, rod
-from .pieces import Handle
+from .handles import Handle
 
 ACROSS = 3  # spans of the body's map that a stub covers in both directions
 _ALONG = 4, 24  # the fewest and the most spans along a stub
