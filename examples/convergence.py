@@ -17,7 +17,7 @@ from pathlib import Path
 from matplotlib.figure import Figure
 
 import iga_nn
-from iga_nn.figures.curves import draw_study
+from iga_nn.figures.line_plots import draw_study
 from iga_nn.level_table import Study, as_csv, as_table
 from solve.study import benchmark_volume
 

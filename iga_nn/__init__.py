@@ -49,7 +49,7 @@ _HOME = {  # module, and the name there where it is another one; type checkers r
     "System": "solve",
     "Value": "solve.forms.conditions",
     "WorkerOptions": "iga_nn.options",
-    "certify": "parameterize.certificate.body",
+    "certify": "parameterize.certificate.certify",
     "convergence": "solve",
     "discretize": "solve",
     "export": "iga_nn.io.formats",

@@ -1,4 +1,4 @@
-from parameterize.certificate.body import certify as certify
+from parameterize.certificate.certify import certify as certify
 from parameterize.config import preset as preset
 from parameterize.run import Parameterization as Parameterization
 from parameterize.run import parameterize as parameterize

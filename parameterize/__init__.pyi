@@ -1,5 +1,5 @@
-from .certificate.body import Certificate as Certificate
-from .certificate.body import certify as certify
+from .certificate.certify import Certificate as Certificate
+from .certificate.certify import certify as certify
 from .certificate.jacobian import PatchCertificate as PatchCertificate
 from .config import Config as Config
 from .config import preset as preset

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .arrays import IntArray, in_brackets
-from .certificate.body import Certificate, certify
 from .certificate.boundary import check_boundary
+from .certificate.certify import Certificate, certify
 from .checkpoint import Checkpoints
 from .config import Config, preset
 from .cube.boundary_map import BoundaryMap, boundary_map
@@ -29,8 +29,8 @@ from .spline.body import Body, BodyLike
 from .surface.surface import Surface
 from .training.backend import choose_device, choose_precision
 from .transfer import transferred
+from .ways.mapping_task import MappingTask
 from .ways.strategy import attempts, ways_of
-from .ways.task import MappingTask
 from .ways.tried import AttemptReport, best_of
 from .ways.way import Way
 

@@ -8,7 +8,7 @@ import numpy as np
 from parameterize.arrays import Array
 from parameterize.spline.volume import FACE_NAMES, BSplineVolume
 
-from .discretization.boundary import FaceRule, boundary_coefficients, face_rule, has_face
+from .discretization.face_data import FaceRule, boundary_coefficients, face_rule, has_face
 from .discretization.on_regions import weak_faces
 from .discretization.operator import FormOperator, Operator, assemble
 from .discretization.quadrature import rule_of

@@ -11,7 +11,7 @@ from parameterize.spline.bspline import breakpoints
 from parameterize.spline.orientation import orientation
 from parameterize.spline.volume import AXES, FACE_NAMES, BSplineVolume
 
-from .discretization.errors import Errors
+from .discretization.error_norms import Errors
 from .discretization.quadrature import gauss_rule, map_planes
 from .discretization.space import TrialSpace
 from .field import Points

@@ -17,7 +17,7 @@ from parameterize.threads import one_blas_thread
 
 from .assembly import assemble_data
 from .diagnostics import ConvergenceError, judge
-from .discretization.errors import Part, error_norms
+from .discretization.error_norms import Compared, error_norms
 from .discretization.nonlinear import Forces, Tangent
 from .discretization.on_regions import demand_area
 from .discretization.space import longest_edge
@@ -319,7 +319,7 @@ def _solution(
     errors = None
     if problem.exact is not None:
         rows = zip(patches, full, strict=True)
-        parts = [Part(patch.volume, patch.space, own, patch.problem.exact_at) for patch, own in rows]
+        parts = [Compared(patch.volume, patch.space, own, patch.problem.exact_at) for patch, own in rows]
         errors = error_norms(parts, balance.forces[0].threads)
     dofs = len(full[0]) * balance.unknowns.count
     doubtful, meaningful = judge(problem, patches, errors, None, dofs)

@@ -11,7 +11,7 @@ import numpy as np
 from parameterize.arrays import Array, in_brackets
 from parameterize.spline.volume import FACE_NAMES
 
-from .discretization.boundary import face_rule, has_face
+from .discretization.face_data import face_rule, has_face
 from .discretization.space import TrialSpace
 from .discretization.unknowns import Unknowns
 from .discretization.weak import WeakFace

@@ -14,7 +14,7 @@ from parameterize.arrays import Array, Mask
 from parameterize.spline.body import all_control_points, as_body, size_of
 from parameterize.spline.bspline import greville, interpolate_grid
 
-from .discretization.boundary import FaceRule
+from .discretization.face_data import FaceRule
 from .discretization.quadrature import gauss_rule, map_planes
 from .discretization.weak import WeakFace
 from .field import Points

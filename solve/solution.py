@@ -13,7 +13,7 @@ from parameterize.display import Shown, above
 from parameterize.spline.body import Body
 from parameterize.spline.volume import BSplineVolume
 
-from .discretization.errors import Errors
+from .discretization.error_norms import Errors
 from .field import BodyField, SplineField
 from .forms.boundary_value_problem import BoundaryValueProblem
 from .forms.form import Quantity

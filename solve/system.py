@@ -18,7 +18,7 @@ from parameterize.threads import one_blas_thread
 
 from .assembly import balanced
 from .diagnostics import ConvergenceError, failure, judge, map_notices
-from .discretization.errors import Errors, Part, error_norms, missing_mean
+from .discretization.error_norms import Compared, Errors, error_norms, missing_mean
 from .discretization.estimate import error_estimate
 from .discretization.on_regions import demand_area, demand_supports
 from .discretization.operator import FormOperator, MatrixFree, Operator, assemble
@@ -27,8 +27,8 @@ from .discretization.unknowns import Glued, Unknowns, unknowns_of
 from .field import BodyField, FieldOnBody, SplineField
 from .forms.boundary_value_problem import BoundaryValueProblem
 from .forms.mass import Mass
+from .linear.glued import Coarse, GluedPreconditioner, shares_of
 from .linear.krylov import generalized_residuals
-from .linear.patches import Coarse, GluedPreconditioner, shares_of
 from .linear.preconditioner import FastDiagonalization
 from .options import IterationOptions, SolveOptions, check_device
 from .patch_system import PatchProblem, PatchSystem
@@ -232,11 +232,11 @@ class System:
         problems = [patch.problem for patch in self.patches]
         return Solution.of(field_of(self.body, self.patches, full), problems, report, problem)
 
-    def _parts(self, full: Sequence[Array]) -> list[Part]:
+    def _parts(self, full: Sequence[Array]) -> list[Compared]:
         """Return coefficients (c, n_u, n_v, n_w) of each patch with the exact values, zero where none are known."""
         exact = self.problem.exact is not None
         return [
-            Part(patch.volume, patch.space, own, patch.problem.exact_at if exact else _nothing)
+            Compared(patch.volume, patch.space, own, patch.problem.exact_at if exact else _nothing)
             for patch, own in zip(self.patches, full, strict=True)
         ]
 

@@ -27,8 +27,8 @@ STAGES = ("S(2)", "S(1)", "cube", "corners", "edges")
 def formula_parameterization(amplitude: float = 0.08, **given: Any) -> Any:
     """A result as training leaves it, from the benchmark map; amplitude 0.4 folds it."""
     from iga_nn.samples import sample
-    from parameterize.certificate.body import certify
     from parameterize.certificate.boundary import check_boundary
+    from parameterize.certificate.certify import certify
     from parameterize.config import preset
     from parameterize.cube.boundary_map import BoundaryMap
     from parameterize.quality.quality import measure

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from patches import SYMMETRIES, cells, frame, patch, plate_with_hole, ring, turned
 
-from parameterize.certificate.body import certify
+from parameterize.certificate.certify import certify
 from parameterize.spline.body import Body
 from parameterize.spline.bspline import open_uniform_knots
 from parameterize.spline.interface import Interface

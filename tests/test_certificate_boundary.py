@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from volumes import bent, mapped
 
-from parameterize.certificate.body import certify
 from parameterize.certificate.boundary import check_boundary, overlapping_boxes
+from parameterize.certificate.certify import certify
 from parameterize.spline.bspline import greville, interpolate_grid, open_uniform_knots
 from parameterize.spline.volume import BSplineVolume
 

@@ -5,8 +5,8 @@ import pytest
 from patches import SYMMETRIES, around_a_line, cells, frame, patch, plate_with_hole, ring, sector, slit, turned
 from volumes import bent
 
-from parameterize.certificate.body import certify
 from parameterize.certificate.boundary import check_boundary
+from parameterize.certificate.certify import certify
 from parameterize.spline.body import Body
 from parameterize.spline.interface import Interface
 from parameterize.spline.volume import BSplineVolume

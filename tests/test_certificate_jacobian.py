@@ -13,7 +13,7 @@ from exact_arithmetic import (
     rational,
 )
 
-from parameterize.certificate.body import certify
+from parameterize.certificate.certify import certify
 from parameterize.spline.bspline import open_uniform_knots
 from parameterize.spline.orientation import mirrored
 from parameterize.spline.volume import BSplineVolume

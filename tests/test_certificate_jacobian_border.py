@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from exact_arithmetic import exact_coefficients, exact_verdict, random_volume
 
-from parameterize.certificate.body import certify
+from parameterize.certificate.certify import certify
 from parameterize.spline.volume import BSplineVolume
 
 DEPTH = 8  # of the exact subdivision: deeper than the certificate's own, so that nothing certified stays undecided

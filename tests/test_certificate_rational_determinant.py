@@ -8,7 +8,7 @@ import pytest
 from exact_arithmetic import exact_coefficients, exact_verdict, random_volume, rational
 from rational_shapes import bent_bar, octant, quarter_ring
 
-from parameterize.certificate.body import certify
+from parameterize.certificate.certify import certify
 from parameterize.certificate.rational_determinant import RationalDeterminantForm
 from parameterize.spline.orientation import mirrored
 from parameterize.spline.volume import BSplineVolume

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from patches import cells, grid, met_twice, patch
 
-from parameterize.certificate.body import certify
 from parameterize.certificate.boundary import check_boundary
+from parameterize.certificate.certify import certify
 from parameterize.spline.body import Body
 
 HOLLOW = [place for place in grid(3, 3, 3).tolist() if place != [1, 1, 1]]

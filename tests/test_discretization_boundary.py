@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from parameterize.spline.bspline import collocation
-from solve.discretization.boundary import boundary_coefficients
+from solve.discretization.face_data import boundary_coefficients
 from solve.discretization.quadrature import spline_rule
 from solve.discretization.space import trial_space
 from solve.study import benchmark_volume

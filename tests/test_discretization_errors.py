@@ -5,7 +5,7 @@ from rational_shapes import octant
 from parameterize.spline.bspline import greville, open_uniform_knots
 from parameterize.spline.volume import BSplineVolume
 from solve import benchmark_volume
-from solve.discretization.errors import Part, error_norms
+from solve.discretization.error_norms import Compared, error_norms
 from solve.discretization.space import trial_space
 
 
@@ -23,7 +23,7 @@ def test_norms_of_a_linear_function_against_zero_by_hand():
         x = points[0]
         return 3.0 * x[None], np.stack([3.0 + 0 * x, 0 * x, 0 * x])[None]
 
-    errors = error_norms([Part(volume, space, np.zeros((1, *space.shape)), exact)])
+    errors = error_norms([Compared(volume, space, np.zeros((1, *space.shape)), exact)])
     assert errors.l2 == pytest.approx(np.sqrt(96.0))
     assert errors.l2_relative == pytest.approx(1.0)
     assert errors.h1_seminorm == pytest.approx(np.sqrt(72.0))
@@ -33,7 +33,7 @@ def test_norms_of_a_linear_function_against_zero_by_hand():
 def test_a_spline_has_no_distance_from_itself():
     """y is a spline on the curved map, with gradient (0, 1, 0): pulls the physical gradient back through J."""
     volume = benchmark_volume(4)
-    part = Part(
+    part = Compared(
         volume,
         trial_space(volume),
         volume.control_points[None, ..., 1],
@@ -47,7 +47,7 @@ def test_a_spline_has_no_distance_from_itself():
 def test_without_gradient_the_seminorm_is_unknown():
     volume = cube(1.0)
     space = trial_space(volume)
-    errors = error_norms([Part(volume, space, np.zeros((1, *space.shape)), lambda x: (x[:1], None))])
+    errors = error_norms([Compared(volume, space, np.zeros((1, *space.shape)), lambda x: (x[:1], None))])
     assert errors.h1_seminorm is None
     assert errors.l2 == pytest.approx(np.sqrt(1.0 / 3.0))
 
@@ -55,7 +55,7 @@ def test_without_gradient_the_seminorm_is_unknown():
 def test_degree_plus_two_points_integrate_the_square_of_one_degree_more_exactly():
     volume = cube(1.0)
     space = trial_space(volume)
-    errors = error_norms([Part(volume, space, np.zeros((1, *space.shape)), lambda x: (x[:1] ** 3, None))])
+    errors = error_norms([Compared(volume, space, np.zeros((1, *space.shape)), lambda x: (x[:1] ** 3, None))])
     assert errors.l2 == pytest.approx(np.sqrt(1.0 / 7.0), rel=1e-14)
 
 
@@ -71,7 +71,7 @@ def test_strips_of_a_plane_and_threads_change_nothing_but_rounding(monkeypatch, 
         slopes = [x[1] * np.cos(x[0] * x[1]), x[0] * np.cos(x[0] * x[1]), 0 * x[0], 0 * x[0], 0 * x[0], 1 + 0 * x[0]]
         return values, np.stack(slopes).reshape(2, 3, *x.shape[1:])
 
-    whole = error_norms([Part(volume, space, coefficients, exact)])
-    monkeypatch.setattr("solve.discretization.errors.POINTS", 1)
-    strips = error_norms([Part(volume, space, coefficients, exact)], threads)
+    whole = error_norms([Compared(volume, space, coefficients, exact)])
+    monkeypatch.setattr("solve.discretization.error_norms.POINTS", 1)
+    strips = error_norms([Compared(volume, space, coefficients, exact)], threads)
     assert (strips.l2, strips.h1_seminorm) == pytest.approx((whole.l2, whole.h1_seminorm), rel=1e-14)

@@ -13,7 +13,7 @@ from matplotlib.image import imread
 
 import solve
 from iga_nn.cli.commands import main
-from iga_nn.figures import colors, curves, fields
+from iga_nn.figures import colors, fields, line_plots
 from iga_nn.figures import cutaway as octant
 from iga_nn.figures import map as map_figures
 from iga_nn.figures import render as rendering
@@ -36,14 +36,14 @@ def colored_share(path) -> float:
 
 
 def test_history_marks_the_stages(tmp_path):
-    curves.draw_history(tmp_path / "history.png", formula_parameterization().history)
+    line_plots.draw_history(tmp_path / "history.png", formula_parameterization().history)
     assert colored_share(tmp_path / "history.png") > 0.001
     assert [file.name for file in tmp_path.iterdir()] == ["history.png"]
 
 
 def shown_terms(history):
     """The names in the legend of the loss, of the terms alone."""
-    (legend,) = [axes.get_legend() for axes in curves.draw_history(None, history).axes if axes.get_legend()]
+    (legend,) = [axes.get_legend() for axes in line_plots.draw_history(None, history).axes if axes.get_legend()]
     return {text.get_text() for text in legend.get_texts()} - {"loss"}
 
 
@@ -186,7 +186,7 @@ def test_the_error_of_vectors_is_a_length():
 def test_study_has_a_curve_a_degree(tmp_path):
     problem = solve.Poisson(exact="x*y*z")
     study = {degree: solve.convergence(benchmark_volume(2), problem, (0, 1), degree) for degree in (2, 3)}
-    curves.draw_study(tmp_path / "study.png", study)
+    line_plots.draw_study(tmp_path / "study.png", study)
     image = imread(tmp_path / "study.png")[..., :3]
     for color in colors.FACE_COLORS[:2]:
         assert np.count_nonzero(np.abs(image - to_rgb(color)).max(axis=-1) < 0.02) > 100
@@ -195,7 +195,7 @@ def test_study_has_a_curve_a_degree(tmp_path):
 def test_a_study_draws_relative_errors_beside_absolute_ones():
     volume, problem = benchmark_volume(2), solve.Poisson(exact="1000*exp(x)*y*z")
     levels = solve.convergence(volume, problem, (0, 1))
-    figure = curves.draw_study(None, {3: levels})
+    figure = line_plots.draw_study(None, {3: levels})
     figure.draw_without_rendering()
     for panel, name, relative in zip(figure.axes, ("l2", "h1_seminorm"), ("l2_relative", "h1_relative"), strict=True):
         (absolute,) = panel.child_axes
@@ -205,9 +205,9 @@ def test_a_study_draws_relative_errors_beside_absolute_ones():
         norm = getattr(levels[1].report, name) / drawn[1]  # of the solution
         assert absolute.get_ylim() == pytest.approx(norm * np.array(panel.get_ylim()))
     other = solve.convergence(benchmark_volume(2, amplitude=0.0), problem, (0,))
-    assert curves.draw_study(None, {2: other, 3: levels}).axes[0].child_axes == []  # two volumes, two norms
+    assert line_plots.draw_study(None, {2: other, 3: levels}).axes[0].child_axes == []  # two volumes, two norms
     nothing = solve.convergence(volume, solve.Poisson(exact="0*x"), (0,))
-    assert curves.draw_study(None, {3: nothing}).axes[0].get_ylabel() == "absolute"
+    assert line_plots.draw_study(None, {3: nothing}).axes[0].get_ylabel() == "absolute"
 
 
 @pytest.mark.pictures

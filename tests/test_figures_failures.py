@@ -12,7 +12,7 @@ import solve
 from iga_nn.cli.commands import main
 from iga_nn.figures import render as rendering
 from iga_nn.figures.colors import error_range, even_range
-from iga_nn.figures.curves import draw_study
+from iga_nn.figures.line_plots import draw_study
 from iga_nn.figures.solution import draw_error, draw_values
 from iga_nn.options import ModesOptions, PoissonOptions, StudyOptions
 from iga_nn.report import html as page

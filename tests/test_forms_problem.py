@@ -5,7 +5,7 @@ import pytest
 
 from parameterize.spline.volume import FACE_NAMES
 from solve import ExpressionError, Poisson, benchmark_volume, check_problem, convergence, solve_problem
-from solve.discretization.boundary import face_rule
+from solve.discretization.face_data import face_rule
 from solve.discretization.space import trial_space
 
 WAVE = "exp(x+z)*sin(y)"

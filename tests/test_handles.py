@@ -6,7 +6,7 @@ from thick_bodies import BALL, eared, plate
 
 from parameterize.certificate.boundary import check_boundary
 from parameterize.layouts.rods.clearance import Clearance
-from parameterize.layouts.skeleton.solid import skeleton_of
+from parameterize.layouts.skeleton.curve_skeleton import skeleton_of
 from parameterize.layouts.stubs.handles import handles_of, without_handles
 from parameterize.layouts.stubs.stub_blocks import ACROSS, footprint, stub_blocks
 from parameterize.spline.volume import BSplineVolume

@@ -8,7 +8,7 @@ from parameterize.conjugate_gradients import conjugate_gradients
 from parameterize.spline.bspline import greville, open_uniform_knots
 from parameterize.spline.volume import FACE_NAMES, BSplineVolume
 from solve import ConvergenceError, Elasticity, Poisson, discretize, solve_problem
-from solve.discretization.boundary import face_rule
+from solve.discretization.face_data import face_rule
 from solve.linear.preconditioner import NO_FACTORS, fast_diagonalization
 from solve.study import benchmark_volume
 

@@ -3,7 +3,7 @@ from __future__ import annotations
 import pytest
 
 from iga_nn.errors import InputError
-from iga_nn.live.form import described, filled, in_words, stated
+from iga_nn.live.page_form import described, filled, in_words, stated
 from iga_nn.options import PROBLEMS, ElasticityOptions, PoissonOptions
 
 KEPT = PoissonOptions(exact="x", refine=(0,))

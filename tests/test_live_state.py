@@ -7,8 +7,8 @@ import os
 import numpy as np
 
 from iga_nn.figures.colors import FACE_COLORS
+from iga_nn.live.page_content import colors, places, row, triangles
 from iga_nn.live.queue import Job
-from iga_nn.live.state import colors, places, row, triangles
 from iga_nn.options import PoissonOptions
 from iga_nn.samples import sample
 from parameterize.progress import Progress
@@ -42,7 +42,7 @@ def test_colours_are_those_of_the_cubes_faces():
 
 
 def test_a_row_says_stage_loss_and_time_left_of_the_training(tmp_path, monkeypatch):
-    monkeypatch.setattr("iga_nn.live.state.time.time", lambda: 1065.0)
+    monkeypatch.setattr("iga_nn.live.page_content.time.time", lambda: 1065.0)
     job = Job(2, "bean.obj", tmp_path, state="running", surface=sample("bean"), losses=[10.0, 1.0, 0.1])
     job.progress = Progress("cube", 30, 300, 0.1, 4, 83.4)
     job.begun = 1000.0

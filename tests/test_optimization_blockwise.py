@@ -9,7 +9,7 @@ from parameterize.conjugate_gradients import conjugate_gradients
 from parameterize.optimization.bending import Fairness
 from parameterize.optimization.contact import contact_penalty
 from parameterize.optimization.determinant_penalty import DeterminantPenalty
-from parameterize.optimization.distortion import Distortion
+from parameterize.optimization.distortion import DistortionTerm
 from parameterize.optimization.energy import SplineEnergy
 from parameterize.optimization.spans import in_blocks
 from parameterize.optimization.term import Weights
@@ -92,9 +92,9 @@ def test_newton_direction_leads_down_and_opens_no_gap():
 def test_straight_blocks_in_their_own_boxes_have_no_distortion():
     spline = rod(7, lengths=(1.0, 2.0, 0.6))
     nets = spline.nets
-    own = Distortion(nets, stretched(nets, own_boxes(spline.body)))
+    own = DistortionTerm(nets, stretched(nets, own_boxes(spline.body)))
     assert own.energy_and_gradient(spline.control)[0] == pytest.approx(0.0, abs=1e-20)
-    assert Distortion(nets, nets.knots).energy_and_gradient(spline.control)[0] > 0.1
+    assert DistortionTerm(nets, nets.knots).energy_and_gradient(spline.control)[0] > 0.1
 
 
 def test_terms_of_a_cut_block_are_those_of_the_whole():
@@ -112,7 +112,7 @@ def test_terms_of_a_cut_block_are_those_of_the_whole():
     uncut = stretched(one.nets, np.array([[2.0, 1.0, 1.0]]))
     for term, other in (
         (Fairness(nets, cut, 1.0), Fairness(one.nets, uncut, 1.0)),
-        (Distortion(nets, cut), Distortion(one.nets, uncut)),
+        (DistortionTerm(nets, cut), DistortionTerm(one.nets, uncut)),
     ):
         found, expected = term.energy_and_gradient(control)[0], other.energy_and_gradient(one.control)[0]
         assert expected > 1e-4

@@ -3,7 +3,7 @@ import pytest
 from test_optimization_rounds import KNOTS, as_volume, gauss_mean, mean_arap, wavy_control
 
 from parameterize.optimization.determinant_penalty import DeterminantPenalty
-from parameterize.optimization.distortion import _MIN_DET, BlockDistortion, Distortion
+from parameterize.optimization.distortion import _MIN_DET, BlockDistortion, DistortionTerm
 from parameterize.optimization.spans import in_blocks
 from parameterize.spline.bspline import greville, open_uniform_knots
 from parameterize.spline.spline_map import ControlNets
@@ -61,7 +61,7 @@ def test_floors_that_are_lowered_keep_the_gradient_true():
     control = 0.7 * control + 0.01 * np.random.default_rng(0).normal(size=control.shape)
     nets = ControlNets(3, (knots,))
     control = control.reshape(3, -1)
-    distortion, determinants = Distortion(nets, nets.knots), DeterminantPenalty(nets, nets.knots)
+    distortion, determinants = DistortionTerm(nets, nets.knots), DeterminantPenalty(nets, nets.knots)
     distortion.terms[0].penalty = 1e3
     determinants.activate(in_blocks([2 * np.argwhere(np.ones((10, 10, 10)))]))  # every other span a direction
     determinants.lower_floors(distortion.lower_floors(control, 0.05))

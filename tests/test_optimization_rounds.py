@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from shapes import rounded_cube, turned
 
-from parameterize.certificate.body import certify
+from parameterize.certificate.certify import certify
 from parameterize.checkpoint import Checkpoints
 from parameterize.config import SplineConfig
 from parameterize.cube.cube import project_radially

@@ -10,8 +10,8 @@ import pytest
 from block_bodies import map_of, surface_fit
 from block_starts import double_torus, torus
 
-from parameterize.certificate.body import certify
 from parameterize.certificate.boundary import check_boundary
+from parameterize.certificate.certify import certify
 from parameterize.checkpoint import Checkpoints
 from parameterize.config import SplineConfig
 from parameterize.optimization.energy import SplineEnergy

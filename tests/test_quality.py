@@ -11,8 +11,8 @@ from patches import patch as from_function
 from patches import plate_with_hole
 from shapes import CORNERS, CUBE_FACES
 
-from parameterize.certificate.body import certify
 from parameterize.certificate.boundary import check_boundary
+from parameterize.certificate.certify import certify
 from parameterize.cube.boundary_map import BoundaryMap
 from parameterize.quality.distances import Distances, nearest_on_boundary, two_sided
 from parameterize.quality.distortion import arap_grid

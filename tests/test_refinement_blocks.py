@@ -8,7 +8,7 @@ from block_bodies import map_of, surface_fit
 from block_starts import torus
 
 from parameterize import refinement
-from parameterize.certificate.body import certify
+from parameterize.certificate.certify import certify
 from parameterize.checkpoint import Checkpoints
 from parameterize.config import RefinementConfig, SplineConfig, preset
 from parameterize.optimization.phases import Polish, Schedule, Separate, Shape, Unfold

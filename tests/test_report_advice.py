@@ -14,8 +14,8 @@ from iga_nn.options import MapOptions
 from iga_nn.report import advice
 from iga_nn.report import document as report
 from iga_nn.workflow.output_folder import RunFolder
-from parameterize.certificate.body import certify
 from parameterize.certificate.boundary import check_boundary
+from parameterize.certificate.certify import certify
 from solve.study import benchmark_volume
 
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from thick_graphs import curve, exposed_genus, genus, loop, thick
 
-from parameterize.certificate.body import certify
 from parameterize.certificate.boundary import check_boundary
+from parameterize.certificate.certify import certify
 from parameterize.layouts.rods.along_skeleton import LayoutError, blocks_along
 from parameterize.layouts.skeleton.graph import Skeleton
 from parameterize.surface.solid import Solid

@@ -8,8 +8,8 @@ from block_bodies import glued
 from test_rods_layout_automatic import GRAPHS
 from thick_graphs import curve, exposed_genus, thick
 
-from parameterize.certificate.body import certify
 from parameterize.certificate.boundary import check_boundary
+from parameterize.certificate.certify import certify
 from parameterize.layouts.rods import along_skeleton
 from parameterize.layouts.rods.along_skeleton import blocks_along
 from parameterize.layouts.rods.rows import with_rows

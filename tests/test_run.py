@@ -11,7 +11,7 @@ from block_starts import torus
 from shapes import turned
 from small_run import FEW, STEPS, small_surface, tiny_config
 
-from parameterize.certificate.body import certify
+from parameterize.certificate.certify import certify
 from parameterize.checkpoint import CheckpointError
 from parameterize.config import NetworkConfig, StageConfig, StageName
 from parameterize.cube import boundary_map, edge_paths
@@ -24,7 +24,7 @@ from parameterize.spline.sampled_boundary import SampledBoundary
 from parameterize.surface.surface import surface_from_arrays
 from parameterize.training.backend import choose_device, choose_precision
 from parameterize.training.trainer import start_map
-from parameterize.ways.task import MOST_POINTS
+from parameterize.ways.mapping_task import MOST_POINTS
 
 
 @pytest.fixture(scope="module", autouse=True)

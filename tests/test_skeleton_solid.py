@@ -9,8 +9,8 @@ import trimesh
 from scipy.spatial import cKDTree
 from thick_bodies import at_volume_one, capsule, implicit, plate, ring, star, union
 
+from parameterize.layouts.skeleton.curve_skeleton import skeleton_of
 from parameterize.layouts.skeleton.graph import SkeletonError
-from parameterize.layouts.skeleton.solid import skeleton_of
 
 AXES = np.concatenate([np.eye(3), -np.eye(3)])
 

@@ -6,7 +6,7 @@ from manifold3d import CrossSection
 from plane_bodies import arrays, prism, ring
 from shapes import rounded_cube
 
-from parameterize.certificate.body import certify
+from parameterize.certificate.certify import certify
 from parameterize.layouts.stacks.stack import stack_of
 from parameterize.layouts.stacks.stacked_blocks import stacked_blocks
 from parameterize.layouts.stacks.tapers import tapered_stack_of

@@ -4,7 +4,7 @@ import pytest
 from parameterize.spline.bspline import greville, open_uniform_knots
 from parameterize.spline.volume import BSplineVolume
 from solve import Poisson, SolveReport, benchmark_volume, convergence, rates
-from solve.discretization.errors import Errors
+from solve.discretization.error_norms import Errors
 from solve.discretization.space import TrialSpace
 from solve.options import SolveOptions
 from solve.patch_system import PatchProblem

@@ -5,7 +5,7 @@ import pytest
 from plane_bodies import BODIES, arrays
 from shapes import rounded_cube
 
-from parameterize.surface.planes import planes_of
+from parameterize.surface.plane_faces import planes_of
 
 
 def test_the_planes_of_a_box_have_its_normals_and_distances():

@@ -4,7 +4,7 @@ import torch
 
 from parameterize.training import losses
 from parameterize.training.losses import determinant
-from parameterize.training.samples import OFFSETS
+from parameterize.training.training_points import OFFSETS
 
 CELL = 0.1
 

@@ -7,7 +7,7 @@ from scipy.spatial import cKDTree
 from shapes import ball, rounded_cube
 
 from parameterize.surface.solid import Solid
-from parameterize.training.samples import (
+from parameterize.training.training_points import (
     OFFSETS,
     TriangleSampler,
     gather,

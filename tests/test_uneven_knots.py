@@ -8,8 +8,8 @@ import pytest
 from iga_nn.io.formats import export, load_volume
 from iga_nn.report.viewer import scene_of
 from iga_nn.workflow.verdict import certified_facts
-from parameterize.certificate.body import certify
 from parameterize.certificate.boundary import check_boundary
+from parameterize.certificate.certify import certify
 from parameterize.quality.distortion import arap_grid
 from parameterize.spline.bspline import breakpoints, greville
 from parameterize.spline.volume import BSplineVolume

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from thick_bodies import plate, star
 
+from parameterize.layouts.skeleton.curve_skeleton import skeleton_of
 from parameterize.layouts.skeleton.graph import Branch, Skeleton
-from parameterize.layouts.skeleton.solid import skeleton_of
 from parameterize.ways import stubs
 from parameterize.ways.blocks import BLOCKS, of_limbs
 

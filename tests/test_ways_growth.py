@@ -17,8 +17,8 @@ from parameterize.progress import History, Progress, ignore
 from parameterize.spline.bspline import open_uniform_knots
 from parameterize.surface.surface import surface_from_arrays
 from parameterize.ways.growth import GROWTH, LAST, SHARES, STIFF, first_cube
+from parameterize.ways.mapping_task import MappingTask
 from parameterize.ways.one_cube import surface_on_cube
-from parameterize.ways.task import MappingTask
 
 pytestmark = pytest.mark.usefixtures("few_distances")
 

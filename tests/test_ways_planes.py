@@ -11,8 +11,8 @@ from parameterize.config import RefinementConfig, preset
 from parameterize.run import parameterize
 from parameterize.spline.body import Body
 from parameterize.surface.surface import surface_from_arrays
+from parameterize.ways.mapping_task import MappingTask
 from parameterize.ways.strategy import NETWORK, PLANES, SHARP, STACKS, WAYS, first_way
-from parameterize.ways.task import MappingTask
 
 QUICK = preset("fast").with_control_points(6)
 

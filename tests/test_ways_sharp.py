@@ -9,8 +9,8 @@ from parameterize.config import preset
 from parameterize.progress import History, ignore
 from parameterize.run import parameterize
 from parameterize.surface.surface import surface_from_arrays
+from parameterize.ways.mapping_task import MappingTask
 from parameterize.ways.sharp import SHARP, ridges_of
-from parameterize.ways.task import MappingTask
 
 QUICK = preset("fast").scaled(0.1).with_control_points(7).with_blocks(1)
 

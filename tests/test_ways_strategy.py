@@ -18,6 +18,7 @@ from parameterize.layouts.rods.along_skeleton import LayoutError
 from parameterize.optimization.endings import Course, Reason
 from parameterize.run import parameterize
 from parameterize.ways import blocks, strategy
+from parameterize.ways.mapping_task import MappingTask
 from parameterize.ways.network import Network
 from parameterize.ways.strategy import (
     BLOCKS,
@@ -33,7 +34,6 @@ from parameterize.ways.strategy import (
     first_way,
     ways_of,
 )
-from parameterize.ways.task import MappingTask
 from parameterize.ways.tried import Tried, best_of
 from parameterize.ways.way import Attempt, Suits
 

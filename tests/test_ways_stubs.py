@@ -17,7 +17,7 @@ from parameterize.spline.spline_map import SplineMap
 from parameterize.spline.volume import BSplineVolume
 from parameterize.surface.errors import MeshError
 from parameterize.surface.surface import surface_from_arrays
-from parameterize.ways.task import MappingTask
+from parameterize.ways.mapping_task import MappingTask
 from parameterize.ways.way import Attempt
 
 NOTHING_KEPT = Checkpoints(None, {}, resume=False)

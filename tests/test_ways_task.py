@@ -11,9 +11,9 @@ from shapes import rounded_cube
 from parameterize.config import preset
 from parameterize.surface.surface import surface_from_arrays
 from parameterize.ways import blocks, stubs
-from parameterize.ways import task as ways_task
+from parameterize.ways import mapping_task as ways_task
+from parameterize.ways.mapping_task import MappingTask
 from parameterize.ways.strategy import BLOCKS, NETWORK, STUBS, WAYS, attempts, first_way
-from parameterize.ways.task import MappingTask
 from parameterize.ways.tried import Tried
 
 

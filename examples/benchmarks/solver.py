@@ -32,7 +32,7 @@ from iga_nn.level_table import csv_text
 from iga_nn.report.document import versions
 from parameterize.files import save_text
 from solve import Elasticity, Poisson, Problem, benchmark_volume, solve_problem
-from solve.discretization.errors import Part, error_norms
+from solve.discretization.error_norms import Part, error_norms
 from solve.discretization.space import trial_space
 
 EXACT = "exp(x+z)*sin(y)"  # of Poisson's equation, and each component of elasticity's displacement

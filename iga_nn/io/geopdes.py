@@ -18,7 +18,7 @@ from parameterize.arrays import Array
 from parameterize.spline.interface import Face
 from parameterize.spline.volume import AXES, FACE_NAMES, BSplineVolume
 
-from .patches import patch_of, projected
+from .patches_of_files import patch_of, projected
 from .words import Words, faults_of, is_number
 
 log = logging.getLogger(__name__)

@@ -20,7 +20,7 @@ from parameterize.spline.interface import Face, Interface, axis_side, varying
 from parameterize.spline.volume import FACE_NAMES, BSplineVolume
 from solve.field import FieldOnBody, SplineField
 
-from .patches import as_text, fastest_first, patch_of
+from .patches_of_files import as_text, fastest_first, patch_of
 from .words import faults_of, finite_numbers
 
 log = logging.getLogger(__name__)

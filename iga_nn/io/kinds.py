@@ -12,7 +12,7 @@ from parameterize.spline.interface import Face
 from parameterize.spline.volume import BSplineVolume
 
 from . import geopdes, gismo, mfem, mfem_writer, splinepy, view, vtk
-from .patches import body_of
+from .patches_of_files import body_of
 from .words import PACKED, faults_of, text_of
 
 HEAD = 4096  # bytes by which a kind is told

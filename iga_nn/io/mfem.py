@@ -11,7 +11,7 @@ from parameterize.spline.interface import Face
 from parameterize.spline.volume import BSplineVolume
 
 from .mfem_layout import Layout, turned_knots
-from .patches import patch_of, projected
+from .patches_of_files import patch_of, projected
 from .words import Words, faults_of
 
 HEADS = ("MFEM NURBS mesh v1.0", "MFEM NURBS mesh v1.1")

@@ -25,7 +25,7 @@ from solve.field import SplineField
 from ..errors import InputError
 from .mfem import CUBE, HEADS, SQUARE, KnotVector
 from .mfem_layout import CORNERS, FACES, Layout, bundles, edges_along, leading_edge, turned_knots
-from .patches import as_text
+from .patches_of_files import as_text
 
 log = logging.getLogger(__name__)
 

@@ -20,7 +20,7 @@ from parameterize.spline.volume import FACE_NAMES, BSplineVolume
 from solve.field import FieldOnBody, SplineField
 
 from ..errors import InputError, one_line
-from .patches import fastest_first, patch_of
+from .patches_of_files import fastest_first, patch_of
 from .words import faults_of
 
 INSTALL = "pip install 'iga-nn[interop]'"

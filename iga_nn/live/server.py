@@ -32,11 +32,11 @@ from ..models import resolve
 from ..options import MapOptions, ProblemOptions
 from ..samples import SAMPLES, sample, write_obj
 from ..workflow.output_folder import has_checkpoint
-from . import form
+from . import page_form
 from . import worker as job_process
+from .page_content import CONTENT, MEGABYTE, as_placed, colors, is_ahead, is_solvable, places, row, triangles
 from .picking import picked
 from .queue import Job, Jobs
-from .state import CONTENT, MEGABYTE, as_placed, colors, is_ahead, is_solvable, places, row, triangles
 from .worker import Message
 
 HOST = "127.0.0.1"  # the page is for this computer's user: there is no option for another one
@@ -73,7 +73,7 @@ class Page:
         own = {"shown": 0, "paper": None, "webgl": True, "asked": 0, "picked": None, ENDED: ""}
         server.state.update({"page": secrets.token_hex(8), **own})
         server.state.update({"limit": self._limit // MEGABYTE, "samples": list(SAMPLES)})
-        server.state.update(form.described())
+        server.state.update(page_form.described())
         server.state.client_only(*own)
         for name, act in {"stop": self.jobs.stop, "delete": self.jobs.delete}.items():
             server.trigger(name)(partial(self._act, act))
@@ -260,7 +260,7 @@ class Page:
             raise web.HTTPNotFound
         try:
             if given and is_ahead(job):
-                job.wanted = form.stated(given, self._problem_options, has_faces=False)
+                job.wanted = page_form.stated(given, self._problem_options, has_faces=False)
         except InputError as error:
             raise web.HTTPBadRequest(text=one_line(error)) from None
         self.jobs.start(job)
@@ -272,7 +272,7 @@ class Page:
         if job is None or not is_solvable(job):
             raise web.HTTPNotFound(text="this job has no volume to solve on")
         try:
-            problem_options = form.stated(await request.post(), self._problem_options)
+            problem_options = page_form.stated(await request.post(), self._problem_options)
         except InputError as error:
             raise web.HTTPBadRequest(text=one_line(error)) from None
         try:

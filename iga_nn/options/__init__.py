@@ -11,6 +11,6 @@ from .problem import ElasticityOptions as ElasticityOptions
 from .problem import PoissonOptions as PoissonOptions
 from .problem import ProblemOptions as ProblemOptions
 from .problem import Units as Units
-from .space import check_size as check_size
-from .space import check_space as check_space
+from .space_check import check_size as check_size
+from .space_check import check_space as check_space
 from .workers import WorkerOptions as WorkerOptions

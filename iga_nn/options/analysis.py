@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from ..errors import InputError, input_errors
 from ..type_check import Checked
 from .problem import modulus
-from .space import check_level, check_space
+from .space_check import check_level, check_space
 
 if TYPE_CHECKING:
     from solve import Elasticity

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal
 from ..errors import InputError, input_errors
 from ..type_check import Checked
 from . import texts
-from .space import check_space
+from .space_check import check_space
 
 if TYPE_CHECKING:
     from solve import Elasticity, Poisson, SolveOptions

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from parameterize.arrays import Array, IntArray, in_brackets
-from parameterize.certificate.body import Certificate
+from parameterize.certificate.certify import Certificate
 from parameterize.certificate.jacobian import PatchCertificate
 from parameterize.config import MAX_CONTROL_POINTS
 from parameterize.spline.body import Body

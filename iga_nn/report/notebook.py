@@ -6,7 +6,7 @@ from functools import singledispatch
 from typing import Any
 
 from parameterize.arrays import Array, in_brackets
-from parameterize.certificate.body import Certificate
+from parameterize.certificate.certify import Certificate
 from parameterize.certificate.jacobian import PatchCertificate
 from parameterize.quality.distortion import BoxDistortion
 from parameterize.quality.quality import BothScales, QualityReport

@@ -21,7 +21,7 @@ from parameterize.config import Config, SplineConfig
 from parameterize.spline.body import BodyLike, as_body
 from parameterize.spline.volume import BSplineVolume
 from parameterize.surface.surface import Surface
-from solve.discretization.errors import POINTS
+from solve.discretization.error_norms import POINTS
 from solve.discretization.quadrature import rule_of
 from solve.discretization.space import trial_space
 from solve.forms.boundary_value_problem import BoundaryValueProblem
@@ -93,8 +93,8 @@ def forecast(
     certified, takes the same time again.
     """
     from parameterize.training.backend import one_thread_an_operation
+    from parameterize.ways.mapping_task import MappingTask
     from parameterize.ways.strategy import cost_of_first, ways_of
-    from parameterize.ways.task import MappingTask
 
     vertices, given = len(surface.vertices), None if corners is None else np.array(corners)
     kept = checkpoints or Checkpoints.none()

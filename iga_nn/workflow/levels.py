@@ -9,7 +9,7 @@ from typing import Any
 from parameterize.checkpoint import Checkpoints
 from parameterize.spline.body import BodyLike, as_body
 from solve import SolveReport
-from solve.discretization.errors import Errors
+from solve.discretization.error_norms import Errors
 from solve.field import BodyField
 from solve.forms.boundary_value_problem import BoundaryValueProblem
 from solve.reactions import Balance

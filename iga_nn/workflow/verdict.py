@@ -5,8 +5,8 @@ from pathlib import Path
 from typing import Any
 
 from parameterize.arrays import in_brackets
-from parameterize.certificate.body import certify
 from parameterize.certificate.boundary import check_boundary
+from parameterize.certificate.certify import certify
 from parameterize.compilation import compilation_told
 from parameterize.quality.quality import proved
 from parameterize.spline.body import BodyLike, as_body

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays import Array, IntArray, Mask
-from ..certificate.body import certify
 from ..certificate.boundary import check_boundary
+from ..certificate.certify import certify
 from ..spline.body import Body
 from ..spline.bspline import greville, open_uniform_knots
 from ..spline.interface import Face, Interface, face_layer, orientations

@@ -29,7 +29,7 @@ _MOST_KEPT = 300e6  # bytes of rows that are kept from product to product; those
 
 
 @dataclass(frozen=True, eq=False)
-class _Spans:
+class _PenaltySpans:
     """Hold k spans: their first control points (k, 3), parametric volumes (k,), floors (k,), and shares (k,).
 
     shares: the factors of the squared shortfalls in the energy. weights: (k, 3, p + 1, p + 1), the matrices from
@@ -43,9 +43,9 @@ class _Spans:
     weights: Array
     back: Array
 
-    def some(self, chosen: Mask) -> "_Spans":
+    def some(self, chosen: Mask) -> "_PenaltySpans":
         """Return the spans that the mask `chosen` (k,) selects."""
-        return _Spans(*(getattr(self, field.name)[chosen] for field in fields(self)))
+        return _PenaltySpans(*(getattr(self, field.name)[chosen] for field in fields(self)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,7 +57,7 @@ class _Rows:
     first row of each span.
     """
 
-    spans: _Spans
+    spans: _PenaltySpans
     shortfall: Array
     shares: Array
     rows: Array
@@ -81,7 +81,7 @@ class BlockDeterminants:
         ]
         self._unscale = np.einsum("i,j,k->ijk", *(1.0 / binomials(3 * degree - 1),) * 3)
         self._share = 1.0 / (self._unscale.size * count)
-        self._pieces: list[_Spans] = []
+        self._pieces: list[_PenaltySpans] = []
 
     def weigh(self, weights: Array, lowered_floors: Array) -> None:
         """Set the weights of all spans, and the shares to which their floors are lowered, (n_u, n_v, n_w) each."""
@@ -93,7 +93,7 @@ class BlockDeterminants:
         floors, shares = self.floor * lowered, self._share * weights[tuple(active.T)] / lowered**2
         blocks = [slice(start, start + _BLOCK) for start in range(0, len(first), _BLOCK)]
         back = np.ascontiguousarray(np.swapaxes(bezier, 2, 3))
-        self._pieces = [_Spans(first[b], volumes[b], floors[b], shares[b], bezier[b], back[b]) for b in blocks]
+        self._pieces = [_PenaltySpans(first[b], volumes[b], floors[b], shares[b], bezier[b], back[b]) for b in blocks]
 
     def weight(self, weights: RoundWeights) -> float:
         """Return the weight of the penalties on folds in a round."""
@@ -102,7 +102,7 @@ class BlockDeterminants:
     def energy_and_gradient(self, control: Array) -> tuple[float, Array]:
         """Return the penalty at control points (3, n_u, n_v, n_w), and its gradient of the same shape."""
 
-        def part(spans: _Spans) -> tuple[float, IntArray, Array]:
+        def part(spans: _PenaltySpans) -> tuple[float, IntArray, Array]:
             found = self._short_rows(control, spans)
             pull = found.shares * found.shortfall
             pushed = _combine(found.rows, found.starts, -2.0 * pull, found.spans.back)
@@ -122,7 +122,7 @@ class BlockDeterminants:
         """
         taken = 0.0
 
-        def piece(spans: _Spans) -> Callable[[Floats], tuple[IntArray, Floats]]:
+        def piece(spans: _PenaltySpans) -> Callable[[Floats], tuple[IntArray, Floats]]:
             nonlocal taken
             found = self._short_rows(control, spans, np.float32)
             taken += found.rows.nbytes
@@ -132,7 +132,7 @@ class BlockDeterminants:
 
         return PiecewiseOperator(in_parallel(piece, self._pieces), _collected)
 
-    def _short_rows(self, control: Array, spans: _Spans, dtype: type[np.floating] = np.float64) -> _Rows:
+    def _short_rows(self, control: Array, spans: _PenaltySpans, dtype: type[np.floating] = np.float64) -> _Rows:
         """Return the rows of the coefficients that lie below the floor on some spans."""
         points = _bezier_points(control, spans.first, spans.weights)
         points = points.reshape(len(points), 3, *spans.weights.shape[2:], spans.weights.shape[2])

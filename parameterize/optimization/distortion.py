@@ -131,7 +131,7 @@ class BlockDistortion:
         return self._grid.weights[planes].ravel()
 
 
-class Distortion(Blockwise[BlockDistortion]):
+class DistortionTerm(Blockwise[BlockDistortion]):
     """Compute the distortion of all blocks; knots: of each block, in units in which the mean of det J is near 1."""
 
     def __init__(self, nets: ControlNets, knots: tuple[Knots, ...]) -> None:

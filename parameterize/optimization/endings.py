@@ -6,8 +6,8 @@ from enum import StrEnum
 from functools import cached_property
 
 from ..arrays import IntArray
-from ..certificate.body import Certificate, certify
 from ..certificate.boundary import check_boundary
+from ..certificate.certify import Certificate, certify
 from ..spline.spline_map import SplineMap
 from .spans import in_blocks
 

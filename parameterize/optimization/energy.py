@@ -17,7 +17,7 @@ from .anchors import Anchors
 from .bending import Fairness
 from .contact import ContactPenalty, contact_penalty
 from .determinant_penalty import DeterminantPenalty
-from .distortion import Distortion
+from .distortion import DistortionTerm
 from .normals import AlignmentPenalty, alignment_penalty
 from .operators import weighted_sum
 from .reassignment import faces_towards, reassign
@@ -58,7 +58,7 @@ class SplineEnergy:
         nets = self.nets
         knots = tuple((u * a, v * b, w * c) for (u, v, w), (a, b, c) in zip(nets.knots, boxes, strict=True))
         self.surface.sliding.measure_in(boxes)
-        self.distortion, self.fairness = Distortion(nets, knots), Fairness(nets, knots, self._weights.fairness)
+        self.distortion, self.fairness = DistortionTerm(nets, knots), Fairness(nets, knots, self._weights.fairness)
         self.determinants = DeterminantPenalty(nets, knots)
         self.determinants.weigh(span_weights)
         self.inner: tuple[Term, ...] = (self.distortion, self.fairness, self.determinants)

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays import Array, IntArray, in_brackets, in_percent
-from ..certificate.body import Certificate
 from ..certificate.boundary import BoundaryCheck
+from ..certificate.certify import Certificate
 from ..certificate.jacobian import PatchCertificate
 from ..cube.boundary_map import BoundaryMap, on_faces
 from ..display import Shown

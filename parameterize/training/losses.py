@@ -16,8 +16,8 @@ from ..config import StageName
 from ..cube.cube import CORNERS
 from ..quality.rotations import closest_rotations
 from .network import InverseMap, map_in_pieces
-from .samples import OFFSETS, Stencils, TriangleSampler, gather
 from .target_shapes import nearest, nearest_on_cube_face
+from .training_points import OFFSETS, Stencils, TriangleSampler, gather
 
 Target = Literal["S(2)", "S(1)", "cube"]
 

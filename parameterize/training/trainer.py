@@ -25,7 +25,7 @@ from ..surface.solid import Solid
 from .losses import STAGES, BoundaryData, EdgePaths, Objective
 from .network import InverseMap
 from .optimizer import TrainingOptimizer
-from .samples import TriangleSampler, stencils
+from .training_points import TriangleSampler, stencils
 
 _log = logging.getLogger(__name__)
 State = dict[str, Tensor]

@@ -28,8 +28,8 @@ from ..surface.geometry import normals_and_areas
 from ..threads import one_blas_thread
 from .growth import GROWTH, STEPS, Grow
 from .laid import in_words, kept_blocks
+from .mapping_task import MOST_POINTS, MappingTask
 from .one_cube import MORE_ROUNDS
-from .task import MOST_POINTS, MappingTask
 from .way import Attempt, Suits, Way, optimized
 
 _log = logging.getLogger(__name__)

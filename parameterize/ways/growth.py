@@ -27,8 +27,8 @@ from ..spline.volume import BSplineVolume
 from ..surface.geometry import vertex_weights
 from ..threads import one_blas_thread
 from .cost import Cost
+from .mapping_task import MappingTask
 from .one_cube import MORE_ROUNDS, OneCube, correspondence, surface_on_cube
-from .task import MappingTask
 from .tried import Tried
 from .way import Attempt, optimized
 

@@ -23,7 +23,7 @@ from ..spline.spline_map import ControlNets, SplineMap
 from ..spline.volume import FACE_NAMES
 from ..threads import one_blas_thread
 from .cost import Cost
-from .task import MappingTask
+from .mapping_task import MappingTask
 from .way import Attempt, Way
 
 _CHECKPOINT = "first"

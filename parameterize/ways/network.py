@@ -16,8 +16,8 @@ from ..surface.solid import Solid
 from ..threads import one_blas_thread
 from .cost import Cost
 from .growth import GROWTH, LAST, STIFF
+from .mapping_task import MappingTask
 from .one_cube import COARSE, OneCube, correspondence, first_spline
-from .task import MappingTask
 from .way import Attempt, optimized
 
 _log = logging.getLogger(__name__)
@@ -69,7 +69,7 @@ class Network(OneCube):
 
     def cost(self, task: MappingTask) -> Cost:
         """Return the cost of the training and the rounds; of a hard surface that of a growth after the first stage."""
-        from ..training.samples import points_of_a_step  # which loads torch
+        from ..training.training_points import points_of_a_step  # which loads torch
 
         config, surface = task.config, task.surface
         points = points_of_a_step(surface.unit_vertices, surface.faces, config.train)

@@ -16,7 +16,7 @@ from ..optimization.rounds import coarse_knots
 from ..optimization.sliding import SlidingParameters
 from ..optimization.surface_distance import Correspondence
 from ..spline.spline_map import ControlNets, SplineMap
-from .task import MOST_POINTS, MappingTask
+from .mapping_task import MOST_POINTS, MappingTask
 from .way import Suits, Way
 
 MORE_ROUNDS = 4  # than after a trained network: such shapes are hard

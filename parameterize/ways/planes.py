@@ -10,7 +10,7 @@ from ..optimization.endings import Reason
 from ..spline.spline_map import SplineMap
 from ..threads import one_blas_thread
 from .laid import Laid, in_words
-from .task import MappingTask
+from .mapping_task import MappingTask
 from .way import Suits
 
 

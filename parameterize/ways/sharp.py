@@ -20,8 +20,8 @@ from ..progress import timed
 from ..surface.features import features_of
 from ..surface.ridges import Ridges
 from ..threads import one_blas_thread
+from .mapping_task import MappingTask
 from .one_cube import COARSE, MORE_ROUNDS, OneCube, correspondence, first_spline, surface_on_cube
-from .task import MappingTask
 from .tried import Tried
 from .way import Attempt, Suits, optimized
 

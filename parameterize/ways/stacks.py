@@ -4,7 +4,7 @@ from ..layouts.stacks.stacked_blocks import StackedBlocks, stacked_blocks
 from ..optimization.endings import Reason
 from ..spline.spline_map import SplineMap
 from .laid import Laid, in_words
-from .task import MappingTask
+from .mapping_task import MappingTask
 from .way import Suits
 
 

@@ -24,12 +24,12 @@ from ..threads import one_blas_thread
 from .blocks import BLOCKS
 from .cost import Cost
 from .growth import GROWTH, LAST, STIFF
+from .mapping_task import MappingTask
 from .network import NETWORK
 from .planes import PLANES
 from .sharp import SHARP
 from .stacks import STACKS
 from .stubs import STUBS
-from .task import MappingTask
 from .tried import Tried
 from .way import Suits, Way
 

@@ -31,7 +31,7 @@ from ..threads import one_blas_thread
 from .blocks import BLOCKS, STIFF_WEIGHTS, TUBE_OF_HANDLES, schedule, softened, surface_fit
 from .growth import GROWTH
 from .laid import in_words
-from .task import MOST_POINTS, MappingTask
+from .mapping_task import MOST_POINTS, MappingTask
 from .way import Attempt, Suits, Way, optimized
 
 _log = logging.getLogger(__name__)

@@ -21,7 +21,7 @@ from ..progress import timed
 from ..spline.spline_map import SplineMap
 from ..surface.solid import Solid
 from .cost import Cost
-from .task import MappingTask
+from .mapping_task import MappingTask
 
 if TYPE_CHECKING:
     from .tried import Tried

@@ -21,8 +21,8 @@ from ..forms.boundary_value_problem import BoundaryValueProblem
 from ..forms.form import strong_form
 from ..forms.frame import face_geometry
 from ..forms.jets import PAIRS, SYMMETRIC, Jet
-from .boundary import has_face
-from .errors import Errors, ratio
+from .error_norms import Errors, ratio
+from .face_data import has_face
 from .quadrature import gauss_rule
 from .space import TrialSpace
 

@@ -18,7 +18,7 @@ from parameterize.spline.volume import FACE_NAMES, BSplineVolume
 from ..field import Points
 from ..forms.boundary_value_problem import BoundaryValueProblem
 from ..forms.conditions import Condition, Value
-from .boundary import has_face
+from .face_data import has_face
 from .space import TrialSpace
 from .surface_rule import SurfaceRule, surface_rule
 from .weak import WeakFace

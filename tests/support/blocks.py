@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from parameterize.certificate.body import certify
 from parameterize.certificate.boundary import check_boundary
+from parameterize.certificate.certify import certify
 from parameterize.config import preset
 from parameterize.cube.boundary_map import BoundaryMap
 from parameterize.quality.quality import measure

@@ -26,9 +26,9 @@ from test_cube_constrained import drum
 import parameterize.cube.sphere as sphere
 import parameterize.training.trainer as trainer
 import parameterize.ways.blocks as blocks
+import parameterize.ways.mapping_task as task
 import parameterize.ways.planes as planes
 import parameterize.ways.stacks as stacks
-import parameterize.ways.task as task
 from iga_nn.options import MapOptions
 from iga_nn.workflow.output_folder import RunFolder
 from parameterize.checkpoint import Checkpoints

@@ -12,10 +12,10 @@ from scipy.spatial import Delaunay, cKDTree
 
 from ...arrays import Array
 from .coons import Quad, Sides, qualities
-from .curves import Curve
 from .planar_graph import PlanarGraph
+from .plane_curves import Curve
+from .plane_regions import Loop, PlaneRegion, outline
 from .polygons import cross, edges_of, inside_of
-from .regions import Loop, PlaneRegion, outline
 
 _THICK = 0.5  # of the shorter chord beside a node, and
 _CLEAR = 0.35  # of the way across the region there: how far a point beside it lies

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ...arrays import Array
-from .curves import SAMPLES, Curve
+from .plane_curves import SAMPLES, Curve
 
 _STEP = 4  # samples of a side, of which the patch is looked at
 _SWEEPS = 12  # over all inner points

@@ -15,9 +15,9 @@ from ...arrays import Array
 from .candidates import Candidates, CurveCuts, beside, branches_of, candidates_of, cut, cut_places, opposite
 from .coons import Quad, Sides, qualities, smoothed
 from .planar_graph import PlanarGraph
+from .plane_regions import PlaneRegion, outline
 from .plane_warp import PlaneWarp
 from .polygons import edges_of
-from .regions import PlaneRegion, outline
 
 _GAP = 0.02  # relative: a decomposition that costs so little more than the best one is taken
 _NODES = 200  # of the search, at most

@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from ...arrays import Array
-from .curves import WIDEST, Chain, Curve
+from .plane_curves import WIDEST, Chain, Curve
 
 _FEWEST = 3  # curves around a closed chain
 _STRAIGHT = np.radians(10.0)  # a chain that turns less in all is not cut

@@ -10,10 +10,10 @@ from ...spline.volume import FACE_NAMES
 from ...surface.geometry import normals_and_areas, signed_volume
 from ..complex import MOST_BLOCKS, Complex, is_proved
 from .arrangement import arrangement_of
+from .cell_merging import merged_cells
 from .hexahedra import along_axes, cost, cubes, quality, subdivided
 from .polyhedron import Polyhedron, polyhedron_of
 from .prisms import prisms
-from .sheets import merged_cells
 
 LEAST_QUALITY = 0.1  # of a block: a corner is six degrees from flat, or det J a thousandth of that at another corner
 _SAME = 1e-5  # relative: the volume and the area of blocks that fill a body are those of its surface

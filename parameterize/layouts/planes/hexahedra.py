@@ -8,7 +8,7 @@ import numpy as np
 from ...arrays import Array, IntArray
 from ..complex import Complex
 from ..planar.polygons import edges_of
-from .sheets import ConvexCell
+from .cell_merging import ConvexCell
 
 
 def quality(blocks: Complex) -> float:

@@ -7,7 +7,7 @@ import numpy as np
 
 from ...arrays import Array, IntArray
 from ...surface.geometry import directed_edges, edge_triangles
-from ...surface.planes import Planes, planes_of
+from ...surface.plane_faces import Planes, planes_of
 from ..planar.polygons import edges_of
 
 MOST_FACES = 64  # of a body that is divided along its planes: a tessellated curved surface has more

@@ -50,7 +50,7 @@ def protrusions(inside: Mask, distance: Array, least: float) -> list[Protrusion]
     hollow = ~inside[tuple(np.rint(middle).astype(np.int64).T)]
     pieces = piece[links[level[:, 0] != level[:, 1]]]
     peak = _farthest(far, piece)  # the point of each piece
-    found = _Pieces(width, hollow, far[peak], slab[peak] * SLAB, least)
+    found = _BodyPieces(width, hollow, far[peak], slab[peak] * SLAB, least)
     neighbours = _neighbours(pieces, len(width))
     for own in np.lexsort([np.arange(len(width)), -slab[peak]]).tolist():
         found.add(own, [other for other in neighbours[own] if slab[peak[other]] > slab[peak[own]]])
@@ -58,7 +58,7 @@ def protrusions(inside: Mask, distance: Array, least: float) -> list[Protrusion]
     return sorted(limbs, key=lambda limb: (-limb.length, limb.tip))
 
 
-class _Pieces:
+class _BodyPieces:
     """The pieces beyond a distance that falls: each is known by the slab's piece in which it begins."""
 
     def __init__(self, width: Floats, hollow: Mask, peak: Floats, base: Floats, least: float) -> None:

@@ -11,7 +11,7 @@ import numpy as np
 
 from ...arrays import Array, IntArray
 from ...surface.geometry import doubled_areas, signed_volume
-from ...surface.planes import FLAT
+from ...surface.plane_faces import FLAT
 from ..planar.plane_warp import PlaneWarp
 from ..planar.polygons import area_of
 

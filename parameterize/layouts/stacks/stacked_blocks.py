@@ -12,12 +12,12 @@ from ...spline.spline_map import SplineMap
 from ...surface.features import SHARP
 from ..complex import FEWEST_SPANS, MOST_BLOCKS, Complex, is_proved, spline_of
 from ..planar.coons import Quad, coons_patch
-from ..planar.curves import Chain, Curve, chains_of, deviation, fitted, needed_spans
 from ..planar.decomposition import Decomposition, decomposition_of
 from ..planar.lines import lines_of
 from ..planar.planar_graph import Cutting, network_of
+from ..planar.plane_curves import Chain, Curve, chains_of, deviation, fitted, needed_spans
+from ..planar.plane_regions import PlaneRegion, regions_of
 from ..planar.polygons import area_of, edges_of
-from ..planar.regions import PlaneRegion, regions_of
 from .stack import SAME, Stack, stack_of
 from .tapers import tapered_stack_of
 

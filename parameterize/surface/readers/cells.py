@@ -12,7 +12,7 @@ import numpy as np
 from ...arrays import Array, IntArray
 from ..errors import MeshError, check_finite, check_indices
 from ..groups import Groups, renumbered
-from .boundary import FACES, boundary_and_inner, cells_behind, faces_alike
+from .boundary_file import FACES, boundary_and_inner, cells_behind, faces_alike
 from .common import DAMAGED, Content
 
 Rows = IntArray | Sequence[Sequence[int]]  # the corners of cells of one kind; (k, corners), or of several lengths

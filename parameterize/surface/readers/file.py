@@ -13,7 +13,6 @@ from ...files import gunzip
 from ..errors import MeshError, check_face_count, check_finite, check_indices, without_unused_defects
 from ..groups import Groups, few, renumbered
 from ..triangulation import triangulate
-from .archive import Archive, in_archive, in_folder
 from .cad import read_iges, read_step
 from .common import DAMAGED, Content, Solids, SurfaceFile, most_bytes
 from .gltf import read_glb, read_gltf
@@ -26,6 +25,7 @@ from .stl import read_stl
 from .threemf import read_3mf
 from .vtk_legacy import read_vtk
 from .vtu import read_vtp, read_vtu
+from .zip_file import Archive, in_archive, in_folder
 
 # Each raises MeshError, without the file's name, for a bad file.
 READERS: dict[str, Callable[[SurfaceFile], Content]] = {

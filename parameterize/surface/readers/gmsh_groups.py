@@ -12,7 +12,7 @@ import numpy as np
 from ...arrays import IntArray
 from ..errors import MeshError
 from ..groups import Groups, gathered
-from .boundary import FACES
+from .boundary_file import FACES
 from .common import DAMAGED
 from .words import Source
 

@@ -11,11 +11,11 @@ from numpy.typing import ArrayLike
 from ...arrays import Array
 from ..errors import MeshError, check_face_count
 from ..groups import gathered
-from .archive import Archive
 from .common import DAMAGED, Content, SurfaceFile, most_bytes
 from .threemf_extensions import makes_another_body, name_of
 from .threemf_model import FULL, ModelPart, Object, Reference, read_model
 from .threemf_package import Package, check_notes
+from .zip_file import Archive
 
 UNITS = {"micron": "micron", "millimeter": "mm", "centimeter": "cm", "inch": "in", "foot": "ft", "meter": "m"}
 DEEPEST = 20  # components in components

@@ -8,8 +8,8 @@ from urllib.parse import unquote
 from xml.etree import ElementTree
 
 from ..errors import MeshError
-from .archive import Archive
 from .common import DAMAGED
+from .zip_file import Archive
 
 RELATIONSHIPS = "/_rels/.rels"
 RELATIONSHIP = "{http://schemas.openxmlformats.org/package/2006/relationships}Relationship"

@@ -23,7 +23,7 @@ POINTS = 2**15  # of a plane that are evaluated at once: their arrays fit into a
 Exact = Callable[[Array], tuple[Array, Array | None]]
 
 
-class Part(NamedTuple):
+class Compared(NamedTuple):
     """Hold a solution on one patch: coefficients (c, n_u, n_v, n_w) in a space, and the exact values.
 
     exact: a function of points (3, ...) that returns u (c, ...) and grad u (c, 3, ...), or None in place of the
@@ -50,7 +50,7 @@ class Errors:
     h1_relative: float | None = None
 
 
-def error_norms(parts: Sequence[Part], threads: int = 1) -> Errors:
+def error_norms(parts: Sequence[Compared], threads: int = 1) -> Errors:
     """Return error norms over the physical domain, over all patches and components together.
 
     The integrals use degree + 2 Gauss points a span and direction.
@@ -134,7 +134,7 @@ def ratio(error: float, size: float) -> float | None:
     return error / size if size > 0.0 else None
 
 
-def missing_mean(parts: Sequence[Part]) -> float:
+def missing_mean(parts: Sequence[Compared]) -> float:
     """Return the constant to add to a solution of one component for the mean of the exact values."""
     lack = size = 0.0
     for volume, space, coefficients, exact in parts:

@@ -19,7 +19,7 @@ from ..options import ProblemOptions
 from ..report.artifacts import ARTIFACTS
 from ..rounding import clock
 from ..workflow.output_folder import has_checkpoint
-from . import form
+from . import page_form
 from .queue import DELETED, STARTS, Job
 
 MEGABYTE = 1 << 20
@@ -52,7 +52,9 @@ def row(job: Job, before: int, problem_options: ProblemOptions) -> dict[str, Any
         "name": job.name,
         "state": job.state,
         "label": LABELS.get(job.state, job.state) + (f", {before} job{'s' * (before > 1)} ahead" if before else ""),
-        "what": f"{form.in_words(job.problem_options)}; on the volume of {job.parent}" if job.problem_options else "",
+        "what": f"{page_form.in_words(job.problem_options)}; on the volume of {job.parent}"
+        if job.problem_options
+        else "",
         "text": job.text,
         "starts": job.state in STARTS
         and not (job.problem_options and job.state == "failed"),  # a solve would fail again
@@ -64,7 +66,7 @@ def row(job: Job, before: int, problem_options: ProblemOptions) -> dict[str, Any
         "files": _files(job) if job.state in ENDED else [],
     }
     if is_solvable(job) or is_ahead(job):
-        said["form"] = form.filled(job.problem_options or job.wanted or problem_options)
+        said["form"] = page_form.filled(job.problem_options or job.wanted or problem_options)
         said["ahead"] = is_ahead(job)
     if job.surface is not None:
         vertices, faces = len(job.surface.vertices), len(job.surface.faces)

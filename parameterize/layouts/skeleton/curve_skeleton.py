@@ -8,10 +8,10 @@ from scipy.spatial import cKDTree
 from ...arrays import Array, IntArray, in_brackets
 from ...surface.solid import Solid
 from .contraction import contract, divide, drop_stubs
-from .curves import smoothed
 from .graph import Branch, Skeleton, SkeletonError
 from .lattice import Depth, Lattice, lattices
 from .limbs import add_limbs
+from .smooth_curves import smoothed
 from .thinning import web_of
 from .web import Web
 

@@ -11,8 +11,8 @@ from ..checkpoint import Checkpoints
 from ..config import Config, SplineConfig
 from ..cube.cutting import subdivide_finely
 from ..layouts.rods.along_skeleton import SPANS
+from ..layouts.skeleton.curve_skeleton import skeleton_of
 from ..layouts.skeleton.graph import Skeleton, SkeletonError
-from ..layouts.skeleton.solid import skeleton_of
 from ..optimization.sliding import SlidingParameters
 from ..optimization.surface_distance import TANGENTIAL, Correspondence
 from ..surface.geometry import vertex_quadrics, vertex_weights
