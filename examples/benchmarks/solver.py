@@ -32,7 +32,7 @@ from iga_nn.level_table import csv_text
 from iga_nn.report.document import versions
 from parameterize.files import save_text
 from solve import Elasticity, Poisson, Problem, benchmark_volume, solve_problem
-from solve.discretization.error_norms import Part, error_norms
+from solve.discretization.error_norms import Compared, error_norms
 from solve.discretization.space import trial_space
 
 EXACT = "exp(x+z)*sin(y)"  # of Poisson's equation, and each component of elasticity's displacement
@@ -95,7 +95,7 @@ def run_ours(case: Case) -> dict[str, Any]:
     wall = time.perf_counter() - start
     report = solution.report
     coefficients = solution.coefficients.reshape(*volume.shape, -1)
-    errors = error_norms([Part(volume, trial_space(volume), np.moveaxis(coefficients, -1, 0), law.exact_at)])
+    errors = error_norms([Compared(volume, trial_space(volume), np.moveaxis(coefficients, -1, 0), law.exact_at)])
     return {
         "dofs": report.dofs,
         "setup": report.seconds["setup"],
