@@ -16,7 +16,7 @@ from xml.etree.ElementTree import Element, SubElement
 
 from parameterize.arrays import Array
 from parameterize.spline.body import Body, BodyLike, as_body
-from parameterize.spline.interface import Face, Interface, axis_side, varying
+from parameterize.spline.interface import Face, Interface, axis_side
 from parameterize.spline.volume import FACE_NAMES, BSplineVolume
 from solve.field import FieldOnBody, SplineField
 
@@ -206,8 +206,7 @@ def _row(interface: Interface) -> list[int]:
     (axis_p, side_p), (axis_q, side_q) = axis_side(face_p), axis_side(face_q)
     along, same = [0] * DIRECTIONS, [0] * DIRECTIONS
     along[axis_p], same[axis_p] = axis_q, int(side_p != side_q)
-    others = varying(face_q)[::-1] if interface.swapped else varying(face_q)
-    for axis, other, flipped in zip(varying(face_p), others, interface.flipped, strict=True):
+    for axis, other, flipped in interface.directions:
         along[axis], same[axis] = other, int(not flipped)
     sides = FACE_NAMES.index(face_p) + 1, FACE_NAMES.index(face_q) + 1
     return [FIRST_ID + p, sides[0], FIRST_ID + q, sides[1], *along, *same]

@@ -113,13 +113,8 @@ def fill_window(polynomials: Polynomials, parameters: Array, cube_faces: IntArra
 def _fill_values(polynomials: Polynomials, direction: int, x: float, n: int, out: Array) -> int:
     """Write row n of values and derivatives (N, 2, p + 1); return the number of the first function that is not zero."""
     starts, begins, first, coefficients, _ = polynomials
-    low, high = starts[direction], starts[direction + 1]
-    while high - low > 1:
-        middle = (low + high) // 2
-        if begins[middle] <= x:
-            low = middle
-        else:
-            high = middle
+    own = begins[starts[direction] : starts[direction + 1]]
+    low = starts[direction] + max(np.searchsorted(own, x, side="right") - 1, 0)
     step, width = x - begins[low], out.shape[2]
     for i in range(width):
         value, slope = coefficients[low, width - 1, i], 0.0

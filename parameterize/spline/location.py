@@ -111,16 +111,15 @@ class _Index:
         """Return the parameters (m, 3) of points (m, 3), NaN outside."""
         within = np.all((points >= self.boxes.low.min(axis=0)) & (points <= self.boxes.high.max(axis=0)), axis=1)
         found = np.full((len(points), 3), np.nan)  # points outside of the box are outside of the volume
-        found[within] = self._parameters(points[within])
+
+        def task(part: Array) -> Array:
+            begin = self.starts[self.tree.query(part)[1]]
+            return np.asarray(_located(part, begin, self.spline, self.boxes))
+
+        searched = points[within]
+        parts = [searched[i : i + _PIECE] for i in range(0, len(searched), _PIECE)]
+        found[within] = np.concatenate([np.empty((0, 3)), *in_parallel(task, parts)])
         return found
-
-    def _parameters(self, points: Array) -> Array:
-        def task(part: slice) -> Array:
-            begin = self.starts[self.tree.query(points[part])[1]]
-            return np.asarray(_located(points[part], begin, self.spline, self.boxes))
-
-        parts = [slice(i, i + _PIECE) for i in range(0, len(points), _PIECE)]
-        return np.concatenate(in_parallel(task, parts)) if parts else np.empty((0, 3))
 
 
 def bezier_nets(volume: BSplineVolume) -> Array:
