@@ -31,12 +31,17 @@ def renamed(package: str, name: str) -> str:
 
 
 def takes_volume(function: Callable[Arguments, Result]) -> Callable[Arguments, Result]:
-    """Let a function whose first argument is `body` take it by its earlier keyword, `volume`, with a warning."""
+    """Let a function whose first argument is `body` take it by its earlier keyword, `volume`, with a warning.
+
+    The function raises TypeError if both are given.
+    """
 
     @wraps(function)
     def taking(*given: Any, **how: Any) -> Result:
         if "volume" in how:
             name = function.__name__
+            if given or "body" in how:
+                raise TypeError(f"{name}: volume is the earlier name of body, the first argument: give one of them")
             warnings.warn(f"{name}(volume=...) is now called {name}(body=...)", DeprecationWarning, stacklevel=2)
             given = (how.pop("volume"), *given)
         return function(*given, **how)

@@ -30,7 +30,7 @@ from .surface.surface import Surface
 from .training.backend import choose_device, choose_precision
 from .transfer import transferred
 from .ways.mapping_task import MappingTask
-from .ways.strategy import attempts, ways_of
+from .ways.strategy import WAYS, attempts, ways_of
 from .ways.tried import AttemptReport, best_of
 from .ways.way import Way
 
@@ -110,7 +110,7 @@ def parameterize(
     device: str = "auto",
     dtype: str = "float32",
     corners: ArrayLike | None = None,
-    ways: Iterable[Way | str] = (),
+    ways: Iterable[Way | str] | Way | str = (),
     progress: ProgressCallback | None = None,
     when_made: MadeCallback | None = None,
     checkpoint_dir: str | Path | None = None,
@@ -179,9 +179,8 @@ def parameterize(
     config, seed = _checked(surface, config, seed)
     if progress is not None and not callable(progress):
         raise TypeError(f"progress must be a function of a Progress, or None, got {progress!r:.80}")
-    asked = tuple(ways)
-    taken = ways_of(asked or config.ways)
-    config = replace(config, ways=tuple(way.name for way in taken)) if asked else config
+    asked = ways_of(ways) or ways_of(config.ways)
+    config = replace(config, ways=tuple(way.name for way in asked))
     place, dtype = choose_device(device), choose_precision(dtype)
     given = given_corners(surface, corners, config)
     config = config if given is None else config.holding_edges()
@@ -193,7 +192,7 @@ def parameterize(
         copy, _ = surface.fitted
         held = given if given is None or copy is surface else corner_vertices(copy, surface.vertices[given])
     task = MappingTask(copy, config, seed, place, dtype, held, seconds, report, checkpoints)
-    tried, decomposition = attempts(task, taken, checkpoints)
+    tried, decomposition = attempts(task, asked or WAYS, checkpoints)
     best = best_of(tried)
     assert best is not None, "at least one of the attempts has a map"
     way, attempt = best

@@ -148,6 +148,8 @@ def march(
     True
     """
     _check(dt, steps, scheme, capacity, every)
+    if callback is not None and not callable(callback):
+        raise TypeError(f"callback must be a function of a time and a field, or None, got {callback!r:.80}")
     options = SolveOptions(
         refine=refine,
         degree=degree,
@@ -252,13 +254,10 @@ def _started(data: _Data, start: FieldOnBody | Data, time: float) -> list[Array]
 
     A datum is projected on each patch: at an interface the mean of the patches' coefficients is taken.
     """
-    components = data.placed.form.components
     if isinstance(start, FieldOnBody):
         full = coefficients_in(start, data.patches)
-        if len(full[0]) != components:
-            raise ValueError(f"start has {len(full[0])} components, the law {components}")
     else:
-        datum = parse("start", start, components, of_coordinates=data.placed.of_coordinates)
+        datum = parse("start", start, data.placed.form.components, of_coordinates=data.placed.of_coordinates)
         placed = datum.placed(UnitFrame.of(data.body))
         own = [placed] if data.body.is_single else map(placed.on_patch, range(len(data.body)))
         parts = zip(data.patches, own, strict=True)

@@ -91,7 +91,9 @@ def newton(
     ------
     ValueError
         For arguments out of range, for a law without a derivative, or whose derivative contradicts `symmetric`, for
-        regions without area, and where fluxes alone are given.
+        regions without area, for a start of other components, and where fluxes alone are given.
+    TypeError
+        For a start that is no field, and for an object that is no problem or no body.
     ConvergenceError
         Where the tolerance is not met.
 
@@ -117,10 +119,10 @@ def newton(
     )
     if not (isinstance(load_steps, Integral) and load_steps >= 1):
         raise ValueError(f"load_steps must be a whole number, at least 1, got {load_steps!r:.80}")
-    if weak := [c.role for c in problem.conditions if c.is_essential and not c.is_strong]:
-        raise ValueError(f"{weak[0]}: newton holds all of u on whole faces of the cube only: write a region such as u0")
     glued = as_body(body)
     placed, patches = prepared(glued, problem, options)
+    if weak := [c.role for c in problem.conditions if c.is_essential and not c.is_strong]:
+        raise ValueError(f"{weak[0]}: newton holds all of u on whole faces of the cube only: write a region such as u0")
     if placed.fixes_nothing and not placed.form.has_reaction:
         raise ValueError(
             "newton: fluxes alone do not determine the solution: give a value, or an exchange, on a face or a region"

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from parameterize.compilation import compilation_told
+from parameterize.old_names import takes_volume
 from parameterize.spline.body import Body, BodyLike, as_body
 from parameterize.spline.bspline import greville, open_uniform_knots
 from parameterize.spline.volume import BSplineVolume
@@ -28,6 +29,7 @@ from .solution import Solution
 from .system import System, build
 
 
+@takes_volume
 def solve_problem(body: BodyLike, problem: Poisson | Elasticity | Problem, **how: Any) -> Solution:
     """Solve a problem on a volume, or on several patches.
 
@@ -103,6 +105,7 @@ def solve_with(body: BodyLike, problem: BoundaryValueProblem, options: SolveOpti
     return discretized(body, problem, options).solve_with(options)
 
 
+@takes_volume
 def discretize(
     body: BodyLike,
     problem: Poisson | Elasticity | Problem,

@@ -296,14 +296,18 @@ class System:
 def coefficients_in(field: FieldOnBody, patches: Sequence[PatchProblem]) -> list[Array]:
     """Return the coefficients (c, n_u, n_v, n_w) of a field in the space of each patch, which contains the field's.
 
-    Raises ValueError for any other field.
+    Raises ValueError for any other field, TypeError for what is no field.
     """
+    if not isinstance(field, FieldOnBody):
+        raise TypeError(f"start must be a field of the trial space, such as solution.field, got {field!r:.80}")
     if len(field.patches) != len(patches):
         raise ValueError(f"the field has {len(field.patches)} patches, the body {len(patches)}")
     found = []
     for own, patch in zip(field.patches, patches, strict=True):
         full = embedded(own.coefficients, own.degrees, own.knots, patch.space)
         found.append(full[None] if full.ndim == 3 else np.moveaxis(full, -1, 0))
+        if len(found[-1]) != (components := patch.problem.form.components):
+            raise ValueError(f"start has {len(found[-1])} components, the law {components}")
     return found
 
 

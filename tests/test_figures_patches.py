@@ -5,6 +5,7 @@ from collections import Counter
 import numpy as np
 import pytest
 from bodies import ring, row_of
+from cube_grids import glued as glued_cubes
 from matplotlib.colors import rgb_to_hsv, to_rgb
 from matplotlib.image import imread
 
@@ -142,6 +143,8 @@ def test_blocks_are_drawn_apart_and_their_interfaces_in_glass(monkeypatch, small
     ends = [apart[1].points, apart[6].points]  # p0_u1 = p1_u0: the gap opens
     assert np.linalg.norm(ends[0] - ends[1], axis=-1).min() > 0.5
     assert figure.get_suptitle() == "3 blocks, 3 interfaces; glued faces are light"
+    figure = map_figures.draw_blocks(None, glued_cubes([(0, 0, 0), (1, 0, 0)]))
+    assert figure.get_suptitle() == "2 blocks, 1 interface; glued faces are light"
 
 
 def test_places_without_a_proof_and_meetings_are_shown_on_blocks(monkeypatch, small_views):

@@ -134,6 +134,9 @@ def test_what_cannot_be_marched_is_refused():
         with pytest.raises(ValueError, match=says):
             iga_nn.march(volume, STILL, **given)
 
+    with pytest.raises(TypeError, match="callback must be a function of a time and a field, or None, got 3"):
+        iga_nn.march(volume, STILL, "0", dt=0.1, steps=1, callback=3)
+
     def turning(time):
         return STILL if time < 0.15 else iga_nn.Poisson(source="0", neumann={"u1": "0"})
 

@@ -171,6 +171,30 @@ def test_what_cannot_be_solved_is_refused():
         iga_nn.newton(volume, iga_nn.Problem(Warm(), exact="3*x"), max_iterations=1)
 
 
+@pytest.mark.parametrize("start", ["1", 1.0, [1], np.ones(3)])
+def test_a_start_that_is_no_field_is_refused(start):
+    with pytest.raises(TypeError, match="start must be a field of the trial space, such as solution.field, got"):
+        iga_nn.newton(benchmark_volume(2), iga_nn.Problem(Warm(), source="1"), start=start)
+
+
+def test_a_start_of_other_components_than_the_law_is_refused():
+    volume = benchmark_volume(2)
+    bent = solve_problem(volume, iga_nn.Elasticity(body_force=("0", "0", "1"))).field
+    for function, problem in (
+        (iga_nn.newton, iga_nn.Problem(Warm(), source="1")),
+        (solve_problem, iga_nn.Poisson(source="1", boundary="0")),
+    ):
+        with pytest.raises(ValueError, match="start has 3 components, the law 1"):
+            function(volume, problem, start=bent)
+
+
+@pytest.mark.parametrize("wrong", [3, Warm()])
+def test_what_is_no_problem_is_refused_as_by_solve(wrong):
+    for function in (iga_nn.newton, solve_problem):
+        with pytest.raises(TypeError, match="problem must be a Poisson, an Elasticity or a Problem, got"):
+            function(benchmark_volume(2), wrong)
+
+
 class Thawing(iga_nn.Form):
     """A conductivity 1 + u."""
 

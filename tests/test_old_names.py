@@ -31,9 +31,25 @@ def test_a_body_of_an_earlier_pickle_is_found():
 
 
 STEPS = {"start": "0", "dt": 1.0, "steps": 1}
+FUNCTIONS = [
+    (iga_nn.convergence, {}),
+    (iga_nn.march, STEPS),
+    (iga_nn.newton, {}),
+    (iga_nn.solve, {}),
+    (iga_nn.discretize, {}),
+]
 
 
-@pytest.mark.parametrize(("function", "more"), [(iga_nn.convergence, {}), (iga_nn.march, STEPS), (iga_nn.newton, {})])
+@pytest.mark.parametrize(("function", "more"), FUNCTIONS)
 def test_a_body_by_its_earlier_keyword_is_taken_with_a_warning(function, more):
     with pytest.warns(DeprecationWarning, match=rf"{function.__name__}\(volume=...\)"), pytest.raises(TypeError):
         function(volume=None, problem=iga_nn.Poisson(source="1"), **more)
+
+
+@pytest.mark.parametrize(("function", "more"), FUNCTIONS)
+def test_a_body_by_both_keywords_is_refused(function, more):
+    volume, problem = benchmark_volume(1), iga_nn.Poisson(source="1", boundary="0")
+    with pytest.raises(TypeError, match=f"{function.__name__}: volume is the earlier name of body"):
+        function(volume, problem, volume=volume, **more)
+    with pytest.raises(TypeError, match="give one of them"):
+        function(body=volume, problem=problem, volume=volume, **more)

@@ -116,8 +116,9 @@ def test_interfaces_without_equal_traces_are_refused(interfaces, says):
 def test_other_objects_are_refused():
     with pytest.raises(TypeError, match="must be a BSplineVolume"):
         iga_nn.Body.from_patches([box((0, 0, 0)), "volume.npz"])
-    with pytest.raises(TypeError, match="patches must be a list of volumes, got BSplineVolume"):
-        iga_nn.Body.from_patches(box((0, 0, 0)))
+    for make in (iga_nn.Body, iga_nn.Body.from_patches):
+        with pytest.raises(TypeError, match="patches must be a list of volumes, got BSplineVolume"):
+            make(box((0, 0, 0)))
 
 
 @pytest.mark.parametrize("tolerance", [-1.0, np.nan, 1.0, "a", None])

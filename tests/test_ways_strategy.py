@@ -169,12 +169,28 @@ def test_the_table_of_the_manual_is_that_of_the_strategy():
 
 
 def test_ways_are_taken_by_themselves_or_by_their_names():
-    assert ways_of(()) == WAYS
+    assert ways_of(()) == ()
     assert ways_of((GROWTH, "planes", "body-with-stubs")) == (GROWTH, PLANES, STUBS)
-    with pytest.raises(ValueError, match="unknown way 'planks': choose from planes, stacks, "):
-        ways_of(("planks",))
-    with pytest.raises(ValueError, match="unknown way 7: "):
-        parameterize(small_surface(), tiny_config(), ways=(7,))
+    assert ways_of("body with stubs") == ways_of(STUBS) == ways_of(("body-with-stubs", STUBS)) == (STUBS,)
+    with pytest.raises(ValueError, match="unknown way 'planks': choose from planes, stacks, body-with-stubs, "):
+        ways_of("planks")
+
+
+@pytest.mark.parametrize("wrong", [7, None, b"planes", [7], [["planes"]], [None]])
+def test_what_is_no_way_and_no_name_is_refused(wrong):
+    with pytest.raises(TypeError, match="ways must be names of ways, such as"):
+        parameterize(small_surface(), tiny_config(), ways=wrong)
+    with pytest.raises(TypeError, match="ways must be names of ways, such as"):
+        parameterize(small_surface(), replace(tiny_config(), ways=wrong))
+
+
+def test_one_way_of_the_options_needs_no_list():
+    result = iga_nn.parameterize(iga_nn.sample("cube"), replace(tiny_config(), ways="planes"))
+    assert (result.origin, result.config.ways) == ("planes", ("planes",))
+
+
+def test_a_way_that_is_named_twice_is_taken_once():
+    assert iga_nn.MapOptions(ways=("body-with-stubs", "body-with-stubs")).config().ways == ("body with stubs",)
 
 
 def test_a_user_may_ask_for_ways(few_distances):
@@ -191,8 +207,8 @@ def test_the_command_line_lists_the_ways_it_refuses_to_know(in_folder, capsys):
     assert main(["parameterize", "cube", "--ways", "planks", "--out", "out"]) == 2
     said = " ".join(capsys.readouterr().err.split())
     assert "--ways" in said and "planks" in said and "stiff-growth" in said
-    assert main(["parameterize", "bean", "--ways", "planes", "stacks", "--out", "out"]) == 2
-    assert "bean: none of the ways asked for suits this body (planes, stacks): allow others" in " ".join(
+    assert main(["parameterize", "bean", "--ways", "planes", "body-with-stubs", "--out", "out"]) == 2
+    assert "bean: none of the ways asked for suits this body (planes, body-with-stubs): allow others" in " ".join(
         capsys.readouterr().err.split()
     )
 

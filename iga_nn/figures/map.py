@@ -120,7 +120,9 @@ def draw_blocks(path: str | Path | None, body: Body) -> Figure:
     ):
         show(panel, title, patches, view)
     name_colors(figure, body)
-    return save(figure, path, f"{len(body)} blocks, {len(body.interfaces)} interfaces; glued faces are light")
+    count = len(body.interfaces)
+    joints = f"{count} interface" + ("s" if count != 1 else "")
+    return save(figure, path, f"{len(body)} blocks, {joints}; glued faces are light")
 
 
 def _moves(points: Sequence[Array], count: int) -> Array:

@@ -95,7 +95,7 @@ class MapOptions(SurfaceOptions):
             if self.corners is not None:
                 config = config.holding_edges()
             config = config.with_blocks(None if self.blocks == "auto" else self.blocks)
-            config = replace(config, ways=tuple(way.replace("-", " ") for way in self.ways))
+            config = replace(config, ways=tuple(dict.fromkeys(way.replace("-", " ") for way in self.ways)))
             if self.control_points == "auto":
                 return config.refined(self.tolerance, self.max_control_points)
             for name in ("tolerance", "max_control_points"):

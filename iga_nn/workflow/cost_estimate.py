@@ -94,12 +94,12 @@ def forecast(
     """
     from parameterize.training.backend import one_thread_an_operation
     from parameterize.ways.mapping_task import MappingTask
-    from parameterize.ways.strategy import cost_of_first, ways_of
+    from parameterize.ways.strategy import WAYS, cost_of_first, ways_of
 
     vertices, given = len(surface.vertices), None if corners is None else np.array(corners)
     kept = checkpoints or Checkpoints.none()
     task = MappingTask(surface, config, 0, device, "float32", given, {}, {}, kept)
-    way, cost = cost_of_first(task, ways_of(config.ways))
+    way, cost = cost_of_first(task, ways_of(config.ways) or WAYS)
     points = config.spline.control_points**3 if cost is None else cost.control_points
     mapped = PER_CONTROL_POINT * points + PER_VERTEX * vertices
     memory = LIBRARIES + FIGURES + max(cost.memory_mb if cost else 0.0, mapped, PER_UNKNOWN * unknowns)

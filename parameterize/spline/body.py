@@ -72,6 +72,7 @@ class Body(Brief, Shown):
     interfaces: tuple[Interface, ...] = ()
 
     def __post_init__(self) -> None:
+        _demand_list(self.patches, Iterable)
         object.__setattr__(self, "patches", tuple(self.patches))
         object.__setattr__(self, "interfaces", tuple(self.interfaces))
         if not self.patches:
@@ -103,8 +104,7 @@ class Body(Brief, Shown):
         they become one, that of the patch that comes first. Raises ValueError where two faces are the same
         surface, but do not have the same degrees, knots and weights, and where three faces are the same.
         """
-        if not isinstance(patches, Sequence):
-            raise TypeError(f"patches must be a list of volumes, got {type(patches).__name__}")
+        _demand_list(patches, Sequence)
         given = tuple(patches)
         if not given:
             raise ValueError("a body has one patch or more")
@@ -285,6 +285,12 @@ def as_body(body: BodyLike) -> Body:
         return body
     demand_volume(body)
     return Body((body,))
+
+
+def _demand_list(patches: object, kind: type) -> None:
+    """Raise TypeError for patches that are not of this kind of list."""
+    if not isinstance(patches, kind):
+        raise TypeError(f"patches must be a list of volumes, got {type(patches).__name__}")
 
 
 def shared_numbers(

@@ -39,17 +39,26 @@ WAYS: tuple[Way, ...] = (PLANES, STACKS, STUBS, BLOCKS, SHARP, NETWORK, GROWTH, 
 _CHECKPOINT = "choice"
 
 
-def ways_of(asked: Iterable[Way | str]) -> tuple[Way, ...]:
-    """Return ways in the order in which they are asked for, by themselves or by their names; all if none is.
+def ways_of(asked: Iterable[Way | str] | Way | str) -> tuple[Way, ...]:
+    """Return ways in the order in which they are asked for, each once, by themselves or by their names.
 
-    Raises ValueError for an unknown name.
+    A single one needs no list. Raises ValueError for an unknown name, TypeError for what is no way and no name.
     """
-    known = {way.name: way for way in WAYS}
-    ways = {one: known.get(one.replace("-", " ")) if isinstance(one, str) else one for one in asked}
-    for name, way in ways.items():
-        if not isinstance(way, Way):
-            raise ValueError(f"unknown way {name!r:.80}: choose from {', '.join(known)}")
-    return tuple(way for way in ways.values() if way is not None) or WAYS
+    if isinstance(asked, str | bytes | Way) or not isinstance(asked, Iterable):
+        return (_way_of(asked),)
+    return tuple(dict.fromkeys(map(_way_of, asked)))
+
+
+def _way_of(asked: object) -> Way:
+    """Return a way, or the one of a name, which may have `-` for spaces. Raises as `ways_of`."""
+    if isinstance(asked, Way):
+        return asked
+    if not isinstance(asked, str):
+        raise TypeError(f"ways must be names of ways, such as ('planes', 'stacks'), got {asked!r:.80}")
+    for way in WAYS:
+        if way.name == asked.replace("-", " "):
+            return way
+    raise ValueError(f"unknown way {asked!r:.80}: choose from {names_of(WAYS)}")
 
 
 def first_way(task: MappingTask, ways: tuple[Way, ...]) -> tuple[Way, Suits]:
@@ -111,8 +120,8 @@ def attempts(task: MappingTask, ways: tuple[Way, ...], checkpoints: Checkpoints)
 
 
 def names_of(ways: Iterable[Way]) -> str:
-    """Return the names of ways, as a message lists them."""
-    return ", ".join(way.name for way in ways)
+    """Return the names of ways, as a message lists them and the command line takes them."""
+    return ", ".join(way.name.replace(" ", "-") for way in ways)
 
 
 def _is_next(way: Way, tried: tuple[Tried, ...], task: MappingTask) -> bool:
