@@ -5,7 +5,7 @@ import pytest
 from volumes import mapped
 
 import iga_nn
-from iga_nn import Flux
+from iga_nn import Fix, Flux
 from parameterize.spline.volume import FACE_NAMES, BSplineVolume
 from solve import Elasticity, Form, Poisson, Problem, benchmark_volume, discretize, solve_problem
 
@@ -127,6 +127,20 @@ def test_heat_that_comes_in_goes_out(coarse_regions):
         ({"roller": "nx < -0.5", "load": {"u1": (1, 0, 0)}}, "leave the body free to move"),
         ({"roller": ["nx < -0.5", "ny < -0.5"], "load": {"u1": (1, 0, 0)}}, r"\(0, 0, -?1, 0, 0, 0\) is not held"),
         ({"fix": {"x < 1": (0, 0, 0), "x < 2": (1, 0, 0)}}, "overlap and contradict each other at"),
+        (
+            {"fix": {"u0": 0, "x < 0.1": (0, 0, 1)}},
+            r"fix 'x < 0.1' and fix 'u0' overlap and contradict each other at \(0,",
+        ),
+        ({"fix": {"u0": 0, "u0 or v0": (0, 0, 1)}}, "fix 'u0 or v0' and fix 'u0' overlap and contradict"),
+        ({"fix": "u0", "conditions": [Fix("u0", (0, 0, 1))]}, "fix 'u0' and fix 'u0' overlap and contradict"),
+        ({"fix": "u0", "roller": {"x < 1": 0.1}}, "roller 'x < 1' and fix 'u0' overlap and contradict"),
+        ({"fix": "u0", "load": {"x < 1": (0, 0, -1)}}, r"where fix 'u0' holds .*write 'x < 1 and not \(u0\)'"),
+        ({"fix": "u0", "pressure": {"nx < -0.9 and y < 0.05": 1}}, "acts where fix 'u0' holds the body"),
+        ({"fix": "u0", "load": {"u0": (0, 0, -1)}}, "load 'u0' acts where fix 'u0' holds .*: give one of them$"),
+        (
+            {"fix": "u0", "spring": {"nx < -0.9": 1}},
+            "no part of the boundary lies there but what fix 'u0' may hold;",
+        ),
         ({"fix": "u0", "displacement": (0, 0, 0)}, "not both"),
         ({"fix": "u0", "load": {"u1": None}}, "load 'u1' has no data"),
         ({"fix": {"u0": (None, None, None)}}, "gives no component"),
@@ -137,6 +151,22 @@ def test_what_cannot_hold_a_body_is_refused_in_one_line(given, says, coarse_regi
     with pytest.raises(ValueError, match=says) as caught:
         solve_problem(BAR, Elasticity(**given))
     assert "\n" not in str(caught.value)
+
+
+def test_conditions_that_agree_may_overlap_on_a_whole_face():
+    held = {"u0": 0, "x < 0.5": (0, None, "x")}
+    law = Elasticity(fix=held, conditions=[Fix("u0 or u0")], load={"nx > 0.5": (0, 0, 1)}, spring={"z < 0.5": 1.0})
+    assert discretize(BAR, law).space.dirichlet == ("u0",)
+
+
+def test_a_whole_face_of_one_patch_and_a_region_that_contradict_are_refused():
+    pair = iga_nn.Body.from_patches(
+        [BSplineVolume.from_function(lambda u, v, w, i=i: (i + u, v, w), 4) for i in range(2)]
+    )
+    for faces, region in (("p1_u1", "x > 1.9"), ("v0", "p1_v0")):
+        with pytest.raises(ValueError, match="overlap and contradict each other"):
+            solve_problem(pair, Poisson(value={faces: 1, region: 2}))
+    assert solve_problem(pair, Poisson(value={"p0_u0": 1, "p1_u1": 2})).report.converged
 
 
 def test_tiny_regions_stay_coercive_or_are_refused():

@@ -91,18 +91,56 @@ def test_robin_and_exchange_are_one_condition():
 @pytest.mark.parametrize(
     ("make", "says"),
     [
-        (lambda: iga_nn.Poisson(conditions=["u0"]), r"conditions must be objects such as iga_nn.Value\('u0', 1\)"),
         (lambda: iga_nn.Poisson(neumann={"u0": "1"}, conditions=[iga_nn.Value("u1")]), "not both"),
         (lambda: iga_nn.Poisson(source="1", conditions=[iga_nn.Flux("u1")]), "flux 'u1' has no data"),
         (lambda: iga_nn.Elasticity(conditions=[iga_nn.Fix("u0", (None,) * 3)]), "fix 'u0': gives no component"),
         (lambda: iga_nn.Elasticity(conditions=[iga_nn.Load("u0", (0, 1))]), "load 'u0' must have three entries"),
         (lambda: iga_nn.Value(3), "a region must be text"),
+        (lambda: iga_nn.Fix(["u0", "u1"]), "a condition has one region, such as 'u0 or u1', got"),
+        (lambda: iga_nn.Exchange("u0", None, 0), "exchange 'u0': the factor must be a number, .* got None"),
+        (lambda: iga_nn.Spring("u0", None), "spring 'u0': the factor must be a number, .* got None"),
+        (lambda: iga_nn.Robin("u0", None), "robin 'u0': the alpha must be a number, .* got None"),
+        (lambda: iga_nn.Elasticity(fix={"u0": (0, 0, np.nan)}), r"fix 'u0' must be finite, got \(0, 0, nan\)"),
+        (lambda: iga_nn.Poisson(value={"u0": np.inf}), "value 'u0' must be finite, got inf"),
+        (
+            lambda: iga_nn.Poisson(conditions=[iga_nn.Roller("u0")]),
+            "roller 'u0' acts along the normal: u must have three",
+        ),
+        (lambda: iga_nn.Poisson(conditions=[iga_nn.Symmetry("u0")]), "symmetry 'u0' acts along the normal"),
+        (lambda: iga_nn.Poisson(conditions=[iga_nn.Pressure("u0", 1)]), "pressure 'u0' acts along the normal"),
     ],
 )
 def test_conditions_that_mean_nothing_are_refused(make, says):
     with pytest.raises(ValueError, match=says) as caught:
         make()
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("make", "says"),
+    [
+        (lambda: iga_nn.Poisson(conditions=["u0"]), r"conditions must be objects such as iga_nn.Value\('u0', 1\)"),
+        (lambda: iga_nn.Poisson(conditions=[iga_nn.Value]), "conditions must be objects such as"),
+        (lambda: iga_nn.Elasticity(conditions=iga_nn.Fix("u0")), "conditions must be a list of conditions .* got Fix"),
+        (lambda: iga_nn.Elasticity(conditions=None), "conditions must be a list of conditions .* got None"),
+        (lambda: iga_nn.Elasticity(conditions="u0"), "conditions must be a list of conditions .* got 'u0'"),
+        (lambda: iga_nn.Poisson(conditions=3), "conditions must be a list of conditions .* got 3"),
+        (lambda: conditions.Condition("u0", 1), "Condition is a base class"),
+        (lambda: iga_nn.Load("u1", (0, 0, 1), factor=3), "factor"),
+        (lambda: iga_nn.Fix("u1", factor=3), "factor"),
+        (lambda: iga_nn.Elasticity(fix="u0").on_surface(3), "must be a part's surface mesh, .* got 3"),
+    ],
+)
+def test_objects_of_a_wrong_type_are_refused(make, says):
+    with pytest.raises(TypeError, match=says) as caught:
+        make()
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.filterwarnings("ignore:force")
+def test_a_former_keyword_beside_the_new_one_is_refused():
+    with pytest.raises(ValueError, match="force is the former name of body_force: give body_force alone"):
+        iga_nn.Elasticity(fix="u0", force=("0", "0", "1"), body_force=("0", "0", "5"))
 
 
 def test_former_keywords_work_and_say_their_new_form():

@@ -39,7 +39,7 @@ WHOLE = 0.999  # share of a face's parameters that a region must cover to count 
 def weak_faces(volume: BSplineVolume, problem: BoundaryValueProblem, space: TrialSpace) -> list[WeakFace]:
     """Return the terms of a problem's conditions on regions, one entry a face on which conditions act.
 
-    Raises ValueError where a region has no area, and where conditions contradict each other.
+    Raises ValueError where conditions contradict each other, also on faces that the trial space holds.
     """
     if len(problem.conditions) > MOST:
         raise ValueError(f"at most {MOST} regions, got {len(problem.conditions)}")
@@ -47,16 +47,30 @@ def weak_faces(volume: BSplineVolume, problem: BoundaryValueProblem, space: Tria
     length = next((frame.length for frame in frames if frame is not None), None)
     found = []
     for name in FACE_NAMES:
-        if name not in space.dirichlet and has_face(space, name):
-            axis, side = axis_side(name)
-            rule = surface_rule(volume, space, axis, side, _coder(problem, name), length)
-            if rule is not None:
-                found.append(_Builder(volume, problem, space, name, rule).face())
+        strong = problem.strong_on(name) if name in space.dirichlet else None
+        if not has_face(space, name) or strong is not None and not _may_overlap(problem, name, strong):
+            continue
+        axis, side = axis_side(name)
+        rule = surface_rule(volume, space, axis, side, _coder(problem, name, strong), length)
+        if rule is None:
+            continue
+        builder = _Builder(volume, problem, space, name, rule)
+        if strong is None:
+            found.append(builder.face())
+        else:
+            builder.demand_consistent()
     return found
 
 
+def _may_overlap(problem: BoundaryValueProblem, name: str, strong: Value) -> bool:
+    """Return whether another condition than the strong one may hold on parts of its face, as the regions' texts say."""
+    names = {name, problem.prefix + name}
+    others = (one for one in problem.conditions if one is not strong)
+    return any(not one.faces or not names.isdisjoint(one.faces) for one in others)
+
+
 def demand_area(problem: BoundaryValueProblem, faces: Sequence[WeakFace], space: TrialSpace, volumes: Patches) -> None:
-    """Raise ValueError where a region has no area on the boundary.
+    """Raise ValueError where a region has no area on the boundary, without the faces that the trial spaces hold.
 
     faces: those of all patches with terms of conditions. space: any of the patches', for sums over all processes.
     """
@@ -64,8 +78,10 @@ def demand_area(problem: BoundaryValueProblem, faces: Sequence[WeakFace], space:
         if not condition.is_strong and space.total(sum(face.weights[face.holds(i)].sum() for face in faces)) == 0.0:
             points = all_control_points(volumes)
             low, high = (in_brackets(ends.tolist()) for ends in (points.min(axis=0), points.max(axis=0)))
+            strong = [one.role for one in problem.conditions if one.is_strong]
+            but = f" but what {', '.join(strong)} may hold" if strong else ""
             raise ValueError(
-                f"{condition.role}: no part of the boundary lies there; the body lies between {low} and {high}"
+                f"{condition.role}: no part of the boundary lies there{but}; the body lies between {low} and {high}"
             )
 
 
@@ -114,15 +130,19 @@ def _unheld(moved: Array, held: Array) -> Array | None:
     return np.asarray(scaled @ turned[:, 0]) if shares[0] <= SLIDES else None
 
 
-def _coder(problem: BoundaryValueProblem, name: str) -> Callable[[Array, Array], Any]:
-    """Return the function from points and normals to codes: bit i where condition i holds, bit 0 for the exact flux."""
-    rest = int(bool(problem.exact_formulas))
+def _coder(problem: BoundaryValueProblem, name: str, strong: Value | None) -> Callable[[Array, Array], Any]:
+    """Return the function from points and normals to codes: bit i where condition i holds, bit 0 for the exact flux.
+
+    strong: the condition that the trial space holds on the face, if any; codes are zero where it is alone.
+    """
+    rest = int(bool(problem.exact_formulas) and strong is None)
+    alone = sum(1 << i for i, condition in enumerate(problem.conditions, 1) if condition is strong)
 
     def codes(x: Array, normal: Array) -> Any:
         found = np.full(x.shape[1:], rest, dtype=np.int64)
         for i, condition in enumerate(problem.conditions, 1):
             found |= condition.region.holds(x, normal, problem.prefix + name).astype(np.int64) << i
-        return found
+        return found if strong is None else np.where(found == alone, 0, found)
 
     return codes
 
@@ -135,10 +155,19 @@ class _Builder:
     name: str
     rule: SurfaceRule
 
+    @property
+    def _points(self) -> Points:
+        return Points.at(np.ascontiguousarray(self.rule.at.x), self.rule.at.parameters)
+
+    def demand_consistent(self) -> None:
+        """Raise ValueError where values contradict each other, or a load acts on a held part."""
+        x, normal = self._points, self.rule.at.normal
+        self._natural(x, normal, self._held(x, normal)[0])
+
     def face(self) -> WeakFace:
         """Return the terms of the face."""
         form, at, weights = self.problem.form, self.rule.at, self.rule.weights
-        x, normal = Points.at(np.ascontiguousarray(at.x), at.parameters), at.normal
+        x, normal = self._points, at.normal
         projector, given = self._held(x, normal)
         gamma, slowest = self._gamma(x, normal)
         loads, factor = self._natural(x, normal, projector)
@@ -243,9 +272,10 @@ class _Builder:
 
     def _refuse_load(self, condition: Condition, point: int) -> None:
         held = [c for i, c in enumerate(self.problem.conditions) if c.is_essential and self._holding(i)[point]]
+        is_same = condition.region == held[0].region
+        remedy = "give one of them" if is_same else f"write '{condition.region} and not ({held[0].region})'"
         raise ValueError(
-            f"{condition.role} acts where {held[0].role} holds the body, as at {self._place(point)}: "
-            f"write '{condition.region} and not ({held[0].region})'"
+            f"{condition.role} acts where {held[0].role} holds the body, as at {self._place(point)}: {remedy}"
         )
 
     def _gamma(self, x: Points, normal: Array) -> tuple[Array, Array]:

@@ -14,7 +14,7 @@ from parameterize.spline.body import Body, BodyLike
 from parameterize.spline.volume import FACE_NAMES
 
 from ..field import FieldOnBody
-from .conditions import Condition, Flux, OnFaces, Robin, Value, on_faces, on_regions
+from .conditions import Condition, Flux, OnFaces, Robin, Value, listed, on_faces, on_regions
 from .data import ByPatch, Data, Datum, PerPatch, finite, parse_each
 from .form import Form, check_shapes, strong_form, strong_terms
 from .frame import UnitFrame
@@ -55,9 +55,7 @@ class BoundaryValueProblem:
             if getattr(self, name) is not None:
                 warnings.warn(f"{name}: write {FORMER[name]}", DeprecationWarning, stacklevel=4)
         made = [one for name, kind in self.keywords.items() for one in on_regions(kind, getattr(self, name))]
-        self._assign(conditions=(*self.conditions, *made), **dict.fromkeys(self.keywords))
-        if wrong := [one for one in self.conditions if not isinstance(one, Condition)]:
-            raise ValueError(f"conditions must be objects such as iga_nn.Value('u0', 1), got {wrong[0]!r:.80}")
+        self._assign(conditions=(*listed(self.conditions), *made), **dict.fromkeys(self.keywords))
 
     def _set(
         self,

@@ -1,12 +1,13 @@
 """Defines the conditions on the boundary, a class each: values, fluxes, and exchanges with the outside, on regions.
 
-A new kind is a subclass with its name in `__all__`. Its keyword in a problem, and its word in messages, in reports and
-on the command line, is the name of the class in small letters.
+A new kind is a subclass with its name in `__all__`. Its word in messages, in reports and on the command line is the
+name of the class in small letters. A problem takes it in `conditions`; a short form of its own is an entry in
+`OF_SCALARS` or `OF_BODIES`, and a field of the same name in the problem.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, Protocol, Self
@@ -18,6 +19,7 @@ from parameterize.spline.volume import FACE_NAMES
 
 from .data import Datum, demand, parse_each
 from .frame import UnitFrame
+from .parser import ExpressionError
 from .region import PATCH_FACE, Part, Region, Regions, regions_of
 
 __all__ = ["Exchange", "Fix", "Flux", "Load", "Pressure", "Robin", "Roller", "Spring", "Symmetry", "Value"]
@@ -46,6 +48,8 @@ class _Where:
         return found
 
     def __set__(self, condition: Any, region: Region | str) -> None:
+        if isinstance(region, list | tuple):
+            raise ExpressionError(f"a condition has one region, such as 'u0 or u1', got {region!r:.80}")
         vars(condition)["region"] = region if isinstance(region, Region) else Region(region)
 
 
@@ -61,7 +65,7 @@ class Condition:
 
     region: _Where = _Where()  # noqa: RUF009  # a descriptor, not a default
     data: Any = None
-    factor: Any = field(default=None, kw_only=True)
+    factor: Any = field(default=None, init=False)
     name: str = field(default="", kw_only=True, repr=False)
     faces: tuple[str, ...] = field(init=False, repr=False, compare=False)
     parsed: Mapping[str, Datum] = field(init=False, repr=False, compare=False)
@@ -70,11 +74,14 @@ class Condition:
     entries: ClassVar[int | None] = None  # of the datum; None for one a component of u
     is_essential: ClassVar[bool] = False  # whether values of u, or of its normal component, are given
     factor_name: ClassVar[str] = "factor"
+    is_along_normal: ClassVar[bool] = False  # so that u has as many components as space
 
     def __init_subclass__(cls) -> None:
         cls.kind = cls.__name__.lower()
 
     def __post_init__(self) -> None:
+        if type(self) is Condition:
+            raise TypeError("Condition is a base class: give one of its kinds, such as iga_nn.Value")
         object.__setattr__(self, "faces", self.region.faces)
         object.__setattr__(self, "parsed", {})
 
@@ -122,8 +129,11 @@ class Condition:
     def stated(self, components: int, *, has_exact: bool, of_coordinates: bool) -> Self:
         """Return the condition of a problem with c components of u, whose data are parsed; zero is written for each.
 
-        Raises ExpressionError for a formula that is refused, ValueError for data of another kind.
+        Raises ExpressionError for a formula that is refused, ValueError for data of another kind, and for a condition
+        along the normal of a law with another number of components than space.
         """
+        if self.is_along_normal and components != 3:
+            raise ValueError(f"{self.role} acts along the normal: u must have three components, not {components}")
         data, count = self.data, self.entries or components
         data = 0.0 if data is None and self.is_essential and not has_exact else data
         data = [0.0] * count if count > 1 and isinstance(data, int | float) and data == 0 else data
@@ -237,6 +247,7 @@ class Roller(Value):
     """
 
     entries: ClassVar[int | None] = 1
+    is_along_normal: ClassVar[bool] = True
 
     def directions(self, components: int, normal: Array) -> list[Array]:
         """Return the normal."""
@@ -302,6 +313,7 @@ class Pressure(Flux):
     """
 
     entries: ClassVar[int | None] = 1
+    is_along_normal: ClassVar[bool] = True
 
     def flux_at(self, exact: Exact, x: Array, normal: Array) -> Array:
         """Return -p n (3, ...)."""
@@ -328,7 +340,10 @@ class Exchange(Condition):
     """
 
     def __init__(self, region: Region | str, alpha: Any, outside: Any = None, *, name: str = "") -> None:
-        super().__init__(region, outside, factor=alpha, name=name)
+        super().__init__(region, outside, name=name)
+        if alpha is None:
+            raise ValueError(f"{self.role}: the {self.factor_name} must be a number, a formula or a function, got None")
+        object.__setattr__(self, "factor", alpha)
 
     @classmethod
     def of(cls, region: Region | str, data: Any, name: str = "") -> Self:
@@ -393,6 +408,16 @@ class Spring(Exchange):
 KINDS = {name.lower(): globals()[name] for name in __all__}  # by the name of an option
 OF_SCALARS = {"value": Value, "inflow": Flux, "exchange": Exchange}  # by keyword; those of Poisson and Problem
 OF_BODIES = {kind.kind: kind for kind in (Fix, Roller, Symmetry, Load, Pressure, Spring)}
+
+
+def listed(given: Iterable[Condition]) -> tuple[Condition, ...]:
+    """Return the conditions of a list. Raises TypeError for anything else."""
+    if isinstance(given, str) or not isinstance(given, Iterable):
+        raise TypeError(f"conditions must be a list of conditions such as [iga_nn.Value('u0', 1)], got {given!r:.80}")
+    found = tuple(given)
+    if wrong := [one for one in found if not isinstance(one, Condition)]:
+        raise TypeError(f"conditions must be objects such as iga_nn.Value('u0', 1), got {wrong[0]!r:.80}")
+    return found
 
 
 def on_regions(kind: type[Condition], entries: GivenRegions | None) -> Iterator[Condition]:

@@ -132,6 +132,8 @@ def parse(name: str, data: Data, components: int = 1, face: str = "", *, of_coor
     data = data.tolist() if isinstance(data, np.ndarray) else data
     is_vector = isinstance(data, Sequence) and not isinstance(data, str | bytes)
     given: list[Any] = list(data) if is_vector else [data]  # type: ignore[arg-type]
+    if not all(np.isfinite(entry) for entry in given if isinstance(entry, int | float)):
+        raise ExpressionError(f"{name} must be finite, got {data!r:.80}")
     entries = [repr(float(entry)) if isinstance(entry, int | float) else entry for entry in given]
     if len(entries) != components and (is_vector or isinstance(entries[0], str)):
         count = WORDS.get(components, str(components))

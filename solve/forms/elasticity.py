@@ -100,6 +100,8 @@ class Elasticity(LawWithData):
                 raise ValueError(f"poisson_ratio must lie between -1 and 1/2, got {ratio!r:.80}")
         self._read_keywords()
         if self.force is not None:
+            if self.body_force is not None:
+                raise ValueError("force is the former name of body_force: give body_force alone")
             self._assign(body_force=self.force, force=None)
         is_loaded = self.displacement is not None or bool(self.traction) or bool(self.conditions)
         force = NONE if self.body_force is None and self.exact is None and is_loaded else self.body_force

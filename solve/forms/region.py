@@ -7,7 +7,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,6 +32,7 @@ TOLERANCE, FAR = 1e-9, 4e-3
 Mask = NDArray[np.bool_]
 
 
+@runtime_checkable
 class Part(Protocol):
     """Describe the surface mesh of a part, as regions need it."""
 
@@ -76,6 +77,8 @@ class Region:
     ------
     ExpressionError
         For a text that is refused.
+    TypeError
+        For a surface that is no surface mesh.
 
     Examples
     --------
@@ -95,6 +98,10 @@ class Region:
     def __post_init__(self) -> None:
         if not isinstance(self.text, str):
             raise ExpressionError(f"a region must be text, such as 'z < 1', got {type(self.text).__name__}")
+        if self.surface is not None and not isinstance(self.surface, Part):
+            raise TypeError(
+                f"a region's surface must be a part's surface mesh, result.boundary.part, got {self.surface!r:.80}"
+            )
         marks: list[str] = list(FACE_NAMES)
 
         def mark(kind: str, argument: str) -> str:
