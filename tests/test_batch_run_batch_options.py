@@ -41,7 +41,10 @@ def test_arguments_of_another_kind_are_refused(in_folder, given, says):
 def test_bad_options_are_one_line_and_cost_nothing(in_folder, capsys):
     assert "name it with --out" in refused(capsys, "bean", out=())
     assert "out is empty" in refused(capsys, "bean", out=("--out", ""))
-    assert "no surface is named" in refused(capsys)
+    for words in ((), ("poisson",), ("elasticity",)):
+        assert "no surface is named" in refused(capsys, *words, out=())
+    for word in ("elastic", "poison", "Elasticity"):
+        assert f"{word}: no such problem and no such surface; did you mean" in refused(capsys, word, "cube")
     assert "no file matches" in refused(capsys, "bean", "*.obj")
     assert "workers 0" in refused(capsys, "bean", "--workers", "0")
     assert "threads per worker 9999" in refused(capsys, "bean", "--threads-per-worker", "9999")

@@ -394,6 +394,7 @@ def test_fetch_takes_the_model_from_the_data_folder(in_folder, monkeypatch):
         (["study", "good.npz", "--degree", "2", "2"], "distinct degrees"),
         (["study", "good.npz", "--exact", "-x"], "--exact=-x"),
         (["study", "missing.npz"], "missing.npz"),
+        (["study", "elasticity", "missing.npz"], "missing.npz: no such file"),
         (["solve", "elasticity", "good.npz"], "no load is given: --load"),
         (["solve", "elasticity", "good.npz", "--exact", "x;y"], "--exact 'x;y': write three formulas"),
         (["solve", "elasticity", "good.npz", "--body-force", "1"], "--body-force '1': write three formulas"),

@@ -14,6 +14,7 @@ import sys
 import time
 from contextlib import contextmanager
 from pathlib import Path
+from unittest.mock import Mock
 from urllib.parse import quote
 
 import numpy as np
@@ -514,6 +515,10 @@ def test_a_page_without_its_packages_says_what_to_install(monkeypatch, capsys):
     ("arguments", "says"),
     [
         (["--port", "70000"], "port 70000"),
+        (["elasticity", "--port", "-1"], "port -1"),
+        (["elasticity", "--young", "-1"], "young must be"),
+        (["elasticity", "--refine", "9"], "refine 9"),
+        (["elasticity", "--load", "nz > 0.9"], "load 'nz > 0.9' has no data"),
         (["--max-upload", "0"], "max upload 0"),
         (["--host", "0.0.0.0"], "--host"),
         (["--control-points", "2"], "at least 4 control points, got 2"),
@@ -525,6 +530,14 @@ def test_bad_options_are_refused_in_one_line(arguments, says, capsys):
     assert main(["app", *arguments]) == 2
     said = capsys.readouterr().err
     assert says in said and said.count("\n") == 1
+
+
+@pytest.mark.parametrize("more", [(), ("--young", "210"), ("--roller", "nz < 0"), ("--load", "nz > 0=0;0;1")])
+def test_a_page_of_a_body_starts_without_loads_and_supports(more, monkeypatch):
+    server = pytest.importorskip("iga_nn.live.server")
+    monkeypatch.setattr(server, "Page", Mock())
+    assert main(["app", "elasticity", *more, "--port", "0"]) == 0
+    server.Page.return_value.run.assert_called_once()
 
 
 def test_help_offers_no_option_that_is_refused(capsys):

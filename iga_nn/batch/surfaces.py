@@ -4,6 +4,7 @@ import glob
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from difflib import get_close_matches
 from pathlib import Path
 
 from parameterize.surface.readers.file import FORMATS
@@ -13,6 +14,8 @@ from ..errors import InputError
 from ..models import MODELS, SET, in_set, not_found
 from ..samples import SAMPLES
 from ..workflow.output_folder import default_folder
+
+NOTHING = "no surface is named: give files, folders, patterns in quotes, samples or models"
 
 
 @dataclass(frozen=True)
@@ -39,7 +42,7 @@ def entries_of(surfaces: Sequence[str], out: Path) -> list[Entry]:
         for name in _names_in(given):
             found.setdefault(str(Path(name).resolve()) if Path(name).is_file() else name, name)
     if not found:
-        raise InputError("no surface is named: give files, folders, patterns in quotes, samples or models")
+        raise InputError(NOTHING)
     meshes = [str(Path(name).absolute()) if Path(name).is_file() else name for name in found.values()]
     return [
         Entry(printable(name), mesh, out.absolute() / folder)
@@ -67,6 +70,17 @@ def divided(entries: Sequence[Entry], max_faces: int) -> list[tuple[Entry, int |
         (replace(entry, folder=entry.folder.with_name(folder)), number)
         for (entry, number), folder in zip(found, folders, strict=True)
     ]
+
+
+def demand_surfaces(surfaces: Sequence[str], problems: Sequence[str]) -> None:
+    """Raise InputError if no surface is named, and if the first one is no surface, but like the name of a problem."""
+    if not surfaces:
+        raise InputError(NOTHING)
+    first = surfaces[0]
+    if first in SAMPLES or first in MODELS or Path(first).exists():
+        return
+    if near := get_close_matches(first, problems, 1):
+        raise InputError(f"{first}: no such problem and no such surface; did you mean {near[0]}?")
 
 
 def demand_one(entries: Sequence[Entry]) -> None:

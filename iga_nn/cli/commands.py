@@ -15,6 +15,7 @@ from cyclopts import App, CycloptsError, Parameter
 
 from ..errors import InputError, expected_errors, input_errors
 from ..options import (
+    PROBLEMS,
     MapOptions,
     ModesOptions,
     PoissonOptions,
@@ -113,9 +114,11 @@ def run_many(
         split: take each body of a file with several, as NAME-0, NAME-1 and so on.
     """
     from ..batch.run_batch import run_batch
+    from ..batch.surfaces import demand_surfaces
     from ..report import document as reports
     from .answer import batch_exit_code
 
+    demand_surfaces(surfaces, list(PROBLEMS))
     if output.out is None:
         raise InputError("batch needs a folder for its results: name it with --out")
     with shown_batch(output.quiet) as progress:

@@ -23,12 +23,12 @@ def serve(
 
     Raises InputError for options that cannot be run, where trame is missing and where the port is taken.
     """
-    mapping.config()
-    problem_options.problem()
     if not 0 <= port <= 65_535:
         raise InputError(f"port {port}: must lie between 0, for any free one, and 65535")
     if max_upload < 1:
         raise InputError(f"max upload {max_upload}: must be at least 1 megabyte")
+    mapping.config()
+    problem_options.check_law()
     try:
         from .server import Page
     except ModuleNotFoundError as error:

@@ -87,6 +87,10 @@ class ProblemOptions(Checked, ABC):
     def problem(self) -> BoundaryValueProblem:
         """Return the problem of these options. Raises InputError."""
 
+    def check_law(self) -> None:
+        """Raise InputError as `problem`, but for loads and supports that are missing: a form may add these."""
+        self.problem()
+
     @classmethod
     @abstractmethod
     def law_of(cls, section: Mapping[str, Any]) -> list[Row]:
@@ -323,8 +327,6 @@ class ElasticityOptions(ProblemOptions):
 
     def problem(self) -> Elasticity:
         """Return the problem of these options. Raises InputError."""
-        from solve import Elasticity
-
         check_space(self.refine, self.degree)
         loads = self.exact, self.body_force, self.displacement, self.traction, self.load, self.pressure, self.fix
         if not any(loads):
@@ -332,9 +334,23 @@ class ElasticityOptions(ProblemOptions):
                 "nothing acts on the body, no load is given: --load 'nz > 0.9=0;0;-1', --pressure, "
                 "--body-force '0;0;-1', --traction or a displacement"
             )
+        body = self._unchecked()
+        with input_errors():
+            body.demand_held()
+        return body
+
+    def check_law(self) -> None:
+        """Raise InputError for all but loads and supports that are missing."""
+        check_space(self.refine, self.degree)
+        replace(self, body_force=self.body_force or "0")._unchecked()
+
+    def _unchecked(self) -> Elasticity:
+        """Return the problem, whether the body is held or not. Raises InputError."""
+        from solve import Elasticity
+
         traction = texts.faces("traction", self.traction)
         with input_errors():
-            body = Elasticity(
+            return Elasticity(
                 exact=texts.vector("--exact", self.exact),
                 body_force=texts.vector("--body-force", self.body_force),
                 displacement=texts.vector("--displacement", self.displacement),
@@ -343,8 +359,6 @@ class ElasticityOptions(ProblemOptions):
                 poisson_ratio=modulus("--poisson-ratio", self.poisson_ratio),
                 conditions=self.conditions(3),
             )
-            body.demand_held()
-            return body
 
 
 def modulus(flag: str, given: float | str) -> Any:

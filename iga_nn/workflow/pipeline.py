@@ -305,6 +305,8 @@ def study_to(
         study_options.levels(),
         bool(problem_options.exact) or isinstance(problem_options, PoissonOptions),
     )
+    if not path.exists():
+        raise InputError(f"{path}: no such file")
     problem = problem_options.problem() if is_known else None
     if problem is None or problem.exact is None:
         raise InputError("no solution to compare with: give it as --exact 'x*y', of a body as --exact 'x*y;sin(z);x'")
