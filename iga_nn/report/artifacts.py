@@ -38,7 +38,7 @@ class Artifact:
     @property
     def is_curve(self) -> bool:
         """Return whether the figure is drawn without VTK, and may also be written as PDF."""
-        return self.draw.startswith("curves.")
+        return self.draw.startswith("line_plots.")
 
     def draw_to(self, path: Path, known: Mapping[str, Any]) -> None:
         """Draw the figure from the known values, and write it."""
@@ -74,14 +74,14 @@ ARTIFACTS = (  # in the order of the pages
     Artifact("lines.png", "map", "parameter lines on the faces", "map.draw_lines", ("volume",)),
     Artifact("cut.png", "map", "the volume cut open, with the distortion inside", "map.draw_cut", ("volume",)),
     Artifact("distortion.png", "map", "distortion on three sections", "map.draw_distortion", ("volume",)),
-    Artifact("history.png", "map", "loss over the training steps", "curves.draw_history", ("history",)),
+    Artifact("history.png", "map", "loss over the training steps", "line_plots.draw_history", ("history",)),
     Artifact(REGIONS, "solution", "where data are given", "regions.draw_conditions", ("volume", "conditions")),
     Artifact("named_faces.png", "solution", "the volume's faces by name", "map.draw_faces", ("named_volume",)),
-    Artifact("convergence.png", "solution", "errors over the mesh size", "curves.draw_study", ("levels",)),
+    Artifact("convergence.png", "solution", "errors over the mesh size", "line_plots.draw_study", ("levels",)),
     Artifact("error.png", "solution", "error on the boundary and on three sections", "solution.draw_error", _ERROR),
     Artifact("modes.png", "modes", "the first modes, by frequency", "solution.draw_modes", ("volume", "modes")),
     Artifact(
-        "study.png", "study", "errors of the convergence study over the mesh size", "curves.draw_study", ("study",)
+        "study.png", "study", "errors of the convergence study over the mesh size", "line_plots.draw_study", ("study",)
     ),
 )
 
