@@ -18,7 +18,7 @@ from ..spline.bspline import breakpoints
 from ..spline.spline_map import ControlNets
 from ..threads import in_parallel
 from .adjacent_faces import Edges, next_faces
-from .face_window import FaceWindow, Polynomials, fill_tangents, fill_window
+from .face_window import FaceWindow, Polynomials, fill_tangents, fill_window, polynomials_of
 from .operators import ControlRows, pieces
 from .spans import numbers, with_neighbours
 
@@ -121,18 +121,18 @@ class SlidingParameters:
         Points whose distance would grow, and points farther away than `reach`, keep their parameters. With
         `keep_layout`, steps that would flip a triangle are shortened.
         """
-        window, polynomials, before = self.window, self._polynomials, self.on_faces
-        field = np.ascontiguousarray(control.reshape(3, -1))
+        window, field = self.window, np.ascontiguousarray(control.reshape(3, -1))
+        polynomials, before = self._polynomials, self.on_faces
         longest = np.array([0.5 / max(shape) for shape in self.nets.shapes])
         edges = next_faces(self.nets), self.boxes
 
         def part(rows: slice) -> tuple[Array, ...]:
-            at = (self.parameters[rows], self.cube_faces[rows], self.fixed[rows], window.of_rows(rows))
-            goal, parameters, cube_faces, there = _slid(polynomials, edges, *at, field, points[rows], longest, reach)
-            return goal, parameters, cube_faces, *there
+            known = (window.indices[rows], window.in_a[rows], window.in_b[rows])
+            at = (self.parameters[rows], self.cube_faces[rows], self.fixed[rows])
+            return _slid(polynomials, edges, *at, *known, field, points[rows], longest, reach)
 
         found = in_parallel(part, pieces(len(points)))
-        goal, parameters, cube_faces, *arrays = map(np.concatenate, zip(*found, strict=True))
+        goal, parameters, cube_faces, *arrays = (np.concatenate(parts) for parts in zip(*found, strict=True))
         self.place(parameters, cube_faces)
         self.window = FaceWindow(*arrays)
         if keep_layout:
@@ -199,7 +199,7 @@ class SlidingParameters:
 
     @cached_property
     def _polynomials(self) -> Polynomials:
-        return Polynomials.of(self.nets)
+        return polynomials_of(self.nets)
 
     @cached_property
     def rows(self) -> ControlRows:
@@ -214,21 +214,25 @@ def _slid(
     parameters: Array,
     cube_faces: IntArray,
     fixed: Mask,
-    old: FaceWindow,
+    indices: IntArray,
+    in_a: Array,
+    in_b: Array,
     control: Array,
     points: Array,
     max_steps: Array,
     reach: float,
-) -> tuple[Array, Array, IntArray, FaceWindow]:
-    """Compute the step of `SlidingParameters.slide` at points (N, 3) with a given window.
+) -> tuple[Array, Array, IntArray, IntArray, Array, Array]:
+    """Compute the step of `SlidingParameters.slide` at points (N, 3) with a given FaceWindow.
 
-    Returns the ends of the steps in the planes of the faces (N, 3), the new parameters, their faces and their window.
+    Returns the ends of the steps in the planes of the faces (N, 3), the new parameters, their faces and their
+    FaceWindow.
     """
-    before, goal, parameters, cube_faces = parameters, parameters.copy(), parameters.copy(), cube_faces.copy()
-    window = FaceWindow(old.indices.copy(), old.in_a.copy(), old.in_b.copy())
+    goal, parameters, cube_faces = parameters.copy(), parameters.copy(), cube_faces.copy()
+    old, before = (indices, in_a, in_b), parameters.copy()
+    indices, in_a, in_b = indices.copy(), in_a.copy(), in_b.copy()
     found = np.empty((len(points), 3, 3))
     for n in range(len(points)):
-        fill_tangents(window, control, n, found)
+        fill_tangents(indices, in_a, in_b, control, n, found)
         square = aa = bb = ab = ra = rb = 0.0
         for c in range(3):
             off, along_a, along_b = found[n, 0, c] - points[n, c], found[n, 1, c], found[n, 2, c]
@@ -248,15 +252,15 @@ def _slid(
         for c in range(3):
             parameters[n, c] = goal[n, c]
         _fold(edges, parameters, cube_faces, fixed, n)
-        fill_window(polynomials, parameters, cube_faces, n, window)
-        fill_tangents(window, control, n, found)
+        fill_window(polynomials, parameters, cube_faces, n, indices, in_a, in_b)
+        fill_tangents(indices, in_a, in_b, control, n, found)
         after = 0.0
         for c in range(3):
             after += (found[n, 0, c] - points[n, c]) ** 2
         if after > square:
             parameters[n], cube_faces[n] = before[n], face
-            window.indices[n], window.in_a[n], window.in_b[n] = old.indices[n], old.in_a[n], old.in_b[n]
-    return goal, parameters, cube_faces, window
+            indices[n], in_a[n], in_b[n] = old[0][n], old[1][n], old[2][n]
+    return goal, parameters, cube_faces, indices, in_a, in_b
 
 
 def fold_over_edges(
