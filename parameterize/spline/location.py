@@ -9,7 +9,6 @@ holds the part, too.
 
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import NamedTuple
 
 import numba
 import numpy as np
@@ -52,41 +51,28 @@ def _index(volume: BSplineVolume) -> "_Index":
     return _Index.of(volume)
 
 
-class _Spline(NamedTuple):
-    """A volume as the kernels read it: padded knots (3, k), degrees (3,), coefficients as `_coefficients` has them."""
+@dataclass(frozen=True, eq=False)
+class _Index:
+    """A volume prepared for the search.
 
-    knots: Array
-    degrees: IntArray
-    control: Array
-    diagonal: float  # of the box of control points
-
-
-class _Boxes(NamedTuple):
-    """The boxes of all spans, and a grid over the whole box that lists for each cell the boxes that reach it.
-
-    nets: the spans' Bezier control points, as `bezier_nets` returns them. ends (s, 2, 3): their parameters. low, high
-    (s, 3): their boxes. Those that reach cell c are members[first[c] : first[c + 1]].
+    starts (s, 3): the middles of the spans, with their images in the tree. nets: their Bezier control points, as
+    `bezier_nets` returns them, and low and high (s, 3), the boxes of these. ends (s, 2, 3): the spans themselves.
+    Cells of a grid over the whole box list the spans whose boxes reach them: members[first[c] : first[c + 1]] of c.
     """
 
+    volume: BSplineVolume
+    starts: Array
+    tree: cKDTree
     nets: Array
-    ends: Array
     low: Array
     high: Array
+    ends: Array
     corner: Array
     cell: Array
     counts: IntArray
     first: IntArray
     members: IntArray
-
-
-@dataclass(frozen=True, eq=False)
-class _Index:
-    """A volume prepared for the search. starts (s, 3): the middles of the spans, with their images in the tree."""
-
-    spline: _Spline
-    starts: Array
-    tree: cKDTree
-    boxes: _Boxes
+    diagonal: float
 
     @classmethod
     def of(cls, volume: BSplineVolume) -> "_Index":
@@ -102,24 +88,28 @@ class _Index:
         counts = np.full(3, max(1, round(1.5 * len(nets) ** (1 / 3))), dtype=np.int64)
         cell = (size + 2.0 * margin) / counts
         corner = corner - margin
-        cells = _cells(low, high, corner, cell, counts)
-        boxes = _Boxes(nets, _ends(volume.knots), low, high, corner, cell, counts, *cells)
-        spline = _Spline(_padded(volume.knots), np.array(volume.degrees), _coefficients(volume), diagonal)
-        return cls(spline, starts, cKDTree(volume.grid(u, v, w).reshape(-1, 3)), boxes)
+        first, members = _cells(low, high, corner, cell, counts)
+        ends = _ends(volume.knots)
+        tree = cKDTree(volume.grid(u, v, w).reshape(-1, 3))
+        return cls(volume, starts, tree, nets, low, high, ends, corner, cell, counts, first, members, diagonal)
 
     def parameters(self, points: Array) -> Array:
         """Return the parameters (m, 3) of points (m, 3), NaN outside."""
-        within = np.all((points >= self.boxes.low.min(axis=0)) & (points <= self.boxes.high.max(axis=0)), axis=1)
+        within = np.all((points >= self.low.min(axis=0)) & (points <= self.high.max(axis=0)), axis=1)
         found = np.full((len(points), 3), np.nan)  # points outside of the box are outside of the volume
-
-        def task(part: Array) -> Array:
-            begin = self.starts[self.tree.query(part)[1]]
-            return np.asarray(_located(part, begin, self.spline, self.boxes))
-
-        searched = points[within]
-        parts = [searched[i : i + _PIECE] for i in range(0, len(searched), _PIECE)]
-        found[within] = np.concatenate([np.empty((0, 3)), *in_parallel(task, parts)])
+        found[within] = self._parameters(points[within])
         return found
+
+    def _parameters(self, points: Array) -> Array:
+        spline = (_padded(self.volume.knots), np.array(self.volume.degrees), _coefficients(self.volume))
+        search = (self.nets, self.low, self.high, self.ends, self.corner, self.cell, self.counts)
+
+        def task(part: slice) -> Array:
+            begin = self.starts[self.tree.query(points[part])[1]]
+            return _located(points[part], begin, *spline, *search, self.first, self.members, self.diagonal)
+
+        parts = [slice(i, i + _PIECE) for i in range(0, len(points), _PIECE)]
+        return np.concatenate(in_parallel(task, parts)) if parts else np.empty((0, 3))
 
 
 def bezier_nets(volume: BSplineVolume) -> Array:
@@ -184,48 +174,61 @@ def _cells(low: Array, high: Array, corner: Array, cell: Array, counts: IntArray
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def _located(points: Array, begin: Array, spline: _Spline, boxes: _Boxes) -> Array:
+def _located(
+    points: Array,
+    begin: Array,
+    knots: Array,
+    degrees: IntArray,
+    control: Array,
+    nets: Array,
+    low: Array,
+    high: Array,
+    ends: Array,
+    corner: Array,
+    cell: Array,
+    counts: IntArray,
+    first: IntArray,
+    members: IntArray,
+    diagonal: float,
+) -> Array:
     """Return the parameters (m, 3) of points (m, 3), NaN outside; `begin` (m, 3) are where Newton's method starts."""
     found = np.full((len(points), 3), np.nan)
-    basis = np.empty((3, 2, 1, spline.degrees.max() + 1))
-    stack = np.empty((_LEVELS + 2, *boxes.nets.shape[1:]))
-    parts = np.empty((_LEVELS + 2, 2, 3))
+    basis = np.empty((3, 2, 1, degrees.max() + 1))
+    stack = np.empty((_LEVELS + 2, *nets.shape[1:]))
+    boxes = np.empty((_LEVELS + 2, 2, 3))
     levels = np.empty(_LEVELS + 2, dtype=np.int64)
     for m in range(len(points)):
-        spans = _spans_near(points[m], boxes)
-        if not len(spans) or _newton(points[m], begin[m], spline, basis, found[m]):
+        place = np.empty(3, dtype=np.int64)
+        inside = True
+        for d in range(3):
+            place[d] = int(np.floor((points[m, d] - corner[d]) / cell[d]))
+            inside = inside and 0 <= place[d] < counts[d]
+        if not inside:
+            continue
+        c = (place[0] * counts[1] + place[1]) * counts[2] + place[2]
+        if first[c] == first[c + 1]:
+            continue
+        if _newton(points[m], begin[m], knots, degrees, control, basis, diagonal, found[m]):
             continue
         visits = 0
-        for s in spans:
-            if not _holds(boxes.low[s], boxes.high[s], points[m]):
+        for s in members[first[c] : first[c + 1]]:
+            if not _holds(low[s], high[s], points[m]):
                 continue
-            stack[0], parts[0], levels[0] = boxes.nets[s], boxes.ends[s], 0
+            stack[0], boxes[0], levels[0] = nets[s], ends[s], 0
             size = 1
             while size and visits < _VISITS:
                 size -= 1
                 visits += 1
                 if levels[size] % 3 == 0:
-                    middle = 0.5 * (parts[size, 0] + parts[size, 1])
-                    if _newton(points[m], middle, spline, basis, found[m]):
+                    middle = 0.5 * (boxes[size, 0] + boxes[size, 1])
+                    if _newton(points[m], middle, knots, degrees, control, basis, diagonal, found[m]):
                         visits = _VISITS
                         break
                 if levels[size] < _LEVELS:
-                    size = _halve(points[m], stack, parts, levels, size, CLOSE * spline.diagonal)
+                    size = _halve(points[m], stack, boxes, levels, size, CLOSE * diagonal)
             if visits >= _VISITS:
                 break
     return found
-
-
-@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def _spans_near(point: Array, boxes: _Boxes) -> IntArray:
-    """Return the spans whose boxes reach the grid's cell of a point (3,); none of a point outside of the grid."""
-    cell = 0
-    for d in range(3):
-        place = int(np.floor((point[d] - boxes.corner[d]) / boxes.cell[d]))
-        if not 0 <= place < boxes.counts[d]:
-            return boxes.members[:0]
-        cell = cell * boxes.counts[d] + place
-    return boxes.members[boxes.first[cell] : boxes.first[cell + 1]]
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
@@ -289,21 +292,32 @@ def _layer(net: Array, axis: int, j: int) -> Array:
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def _newton(point: Array, begin: Array, spline: _Spline, basis: Array, found: Array) -> bool:
+def _newton(
+    point: Array,
+    begin: Array,
+    knots: Array,
+    degrees: IntArray,
+    control: Array,
+    basis: Array,
+    diagonal: float,
+    found: Array,
+) -> bool:
     """Solve F(u, v, w) = x from `begin` in the cube; write the parameters into `found` where that succeeds."""
-    where, trial, jacobian = begin.copy(), begin.copy(), np.empty((4, 3))
-    rest = point - _evaluate(where, spline, basis, jacobian)
+    where, trial = begin.copy(), begin.copy()
+    value, jacobian = np.empty(3), np.empty((3, 3))
+    _evaluate(where, knots, degrees, control, basis, value, jacobian)
+    rest = point - value
     off = np.sqrt((rest**2).sum())
     for _ in range(_STEPS):
-        if off <= _EXACT * spline.diagonal:
+        if off <= _EXACT * diagonal:
             break
-        step = _solved(jacobian[:3], rest)
+        step = _solved(jacobian, rest)
         share, closer = 1.0, False
         for _ in range(_HALVINGS):
             for d in range(3):
                 trial[d] = min(max(where[d] + share * step[d], 0.0), 1.0)
-            rest = point - _evaluate(trial, spline, basis, jacobian)
-            now = np.sqrt((rest**2).sum())
+            _evaluate(trial, knots, degrees, control, basis, value, jacobian)
+            now = np.sqrt(((point - value) ** 2).sum())
             closer = now < off
             if closer:
                 break
@@ -311,7 +325,8 @@ def _newton(point: Array, begin: Array, spline: _Spline, basis: Array, found: Ar
         if not closer:
             break
         where[:], off = trial, now
-    if off > CLOSE * spline.diagonal:
+        rest = point - value
+    if off > CLOSE * diagonal:
         return False
     found[:] = where
     return True
@@ -331,32 +346,46 @@ def _solved(matrix: Array, right: Array) -> Array:
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def _evaluate(where: Array, spline: _Spline, basis: Array, jacobian: Array) -> Array:
-    """Return F (3,) at parameters (3,), and write its Jacobian, columns the directions, into the first three rows.
+def _evaluate(
+    where: Array,
+    knots: Array,
+    degrees: IntArray,
+    control: Array,
+    basis: Array,
+    value: Array,
+    jacobian: Array,
+) -> None:
+    """Write F (3,) and its Jacobian (3, 3), columns the directions, at parameters (3,).
 
-    Of a rational volume the last row is left with the gradient of the weight.
+    control: (n_u, n_v, n_w, 3), or homogeneous, (.., 4), with the weight in the last place.
     """
-    first, value, control = np.empty(3, dtype=np.int64), np.zeros(4), spline.control
+    first = np.empty(3, dtype=np.int64)
     for d in range(3):
-        degree = spline.degrees[d]
-        span = np.searchsorted(spline.knots[d], where[d], side="right") - 1
-        span = min(max(span, degree), control.shape[d] - 1)
-        fill_basis(spline.knots[d], degree, where[d : d + 1], np.array([span]), basis[d, :, :, : degree + 1])
-        first[d] = span - degree
-    jacobian[:] = 0.0
+        n = control.shape[d]
+        span = np.searchsorted(knots[d], where[d], side="right") - 1
+        span = min(max(span, degrees[d]), n - 1)
+        fill_basis(knots[d], degrees[d], where[d : d + 1], np.array([span]), basis[d, :, :, : degrees[d] + 1])
+        first[d] = span - degrees[d]
+    value[:], jacobian[:] = 0.0, 0.0
+    is_rational, weight, along_u, along_v, along_w = control.shape[3] == 4, 0.0, 0.0, 0.0, 0.0  # W and its gradient
     u, v, w = basis[0, :, 0], basis[1, :, 0], basis[2, :, 0]
-    for i in range(spline.degrees[0] + 1):
-        for j in range(spline.degrees[1] + 1):
-            for k in range(spline.degrees[2] + 1):
+    for i in range(degrees[0] + 1):
+        for j in range(degrees[1] + 1):
+            for k in range(degrees[2] + 1):
                 p = control[first[0] + i, first[1] + j, first[2] + k]
-                for d in range(len(p)):
+                for d in range(3):
                     value[d] += u[0, i] * v[0, j] * w[0, k] * p[d]
                     jacobian[d, 0] += u[1, i] * v[0, j] * w[0, k] * p[d]
                     jacobian[d, 1] += u[0, i] * v[1, j] * w[0, k] * p[d]
                     jacobian[d, 2] += u[0, i] * v[0, j] * w[1, k] * p[d]
-    if control.shape[3] == 4:
+                if is_rational:
+                    weight += u[0, i] * v[0, j] * w[0, k] * p[3]
+                    along_u += u[1, i] * v[0, j] * w[0, k] * p[3]
+                    along_v += u[0, i] * v[1, j] * w[0, k] * p[3]
+                    along_w += u[0, i] * v[0, j] * w[1, k] * p[3]
+    if is_rational:
         for d in range(3):
-            value[d] /= value[3]
-            for a in range(3):
-                jacobian[d, a] = (jacobian[d, a] - value[d] * jacobian[3, a]) / value[3]
-    return value[:3]
+            value[d] /= weight
+            jacobian[d, 0] = (jacobian[d, 0] - value[d] * along_u) / weight
+            jacobian[d, 1] = (jacobian[d, 1] - value[d] * along_v) / weight
+            jacobian[d, 2] = (jacobian[d, 2] - value[d] * along_w) / weight
