@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 
+from parameterize.spline.body import as_body
 from parameterize.spline.bspline import greville, open_uniform_knots
 from parameterize.spline.volume import BSplineVolume
 from solve import Poisson, SolveReport, benchmark_volume, convergence, rates
@@ -73,7 +74,12 @@ def test_a_map_that_is_less_smooth_caps_the_rate_of_a_smoother_space():
     kept = convergence(volume, WAVE, refine=(1, 2), degree=4)
     knots = [open_uniform_knots(n + 4, 4) for n in (8, 16)]
     smoother = [
-        build(volume, WAVE, [PatchProblem(volume, WAVE, TrialSpace((4, 4, 4), (k, k, k)))], SolveOptions(threads=1))
+        build(
+            as_body(volume),
+            WAVE,
+            [PatchProblem(volume, WAVE, TrialSpace((4, 4, 4), (k, k, k)))],
+            SolveOptions(threads=1),
+        )
         .solve(tolerance=1e-12)
         .report
         for k in knots

@@ -138,7 +138,7 @@ def clamped_and_pulled(body: BodyLike) -> tuple[str, iga_nn.Elasticity]:
 
 def work_of(solution: Solution, pulled: str) -> float:
     """Return the work of the pull: the displacement along it, integrated over its region."""
-    (direction,) = solution.problem.load.values()
+    (direction,) = (one.data for one in solution.problem.conditions if isinstance(one, iga_nn.Load))
     return float(np.dot(iga_nn.integrate(solution, "u", over=pulled), direction))
 
 
