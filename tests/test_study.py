@@ -72,7 +72,7 @@ def test_a_map_that_is_less_smooth_caps_the_rate_of_a_smoother_space():
     """Why raised spaces keep the map's own smoothness: degree 4, C^3 at the knots of the C^2 map, loses its order."""
     volume = benchmark_volume(4)
     kept = convergence(volume, WAVE, refine=(1, 2), degree=4)
-    knots = [open_uniform_knots(n + 4, 4) for n in (8, 16)]
+    knots, body = [open_uniform_knots(n + 4, 4) for n in (8, 16)], as_body(volume)
     smoother = [
         build(
             as_body(volume),
