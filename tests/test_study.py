@@ -75,7 +75,7 @@ def test_a_map_that_is_less_smooth_caps_the_rate_of_a_smoother_space():
     knots, body = [open_uniform_knots(n + 4, 4) for n in (8, 16)], as_body(volume)
     smoother = [
         build(
-            as_body(volume),
+            body,
             WAVE,
             [PatchProblem(volume, WAVE, TrialSpace((4, 4, 4), (k, k, k)))],
             SolveOptions(threads=1),
