@@ -27,6 +27,7 @@ from .interface import (
     knots_agree,
     orientations,
 )
+from .patch_groups import PatchGroup, groups_of
 from .volume import FACE_NAMES, BSplineVolume, demand_volume
 
 if TYPE_CHECKING:
@@ -181,6 +182,11 @@ class Body(Brief, Shown):
     def face_name(self, patch: int, face: str) -> str:
         """Return the name by which data and regions call a face: "u0" of a single patch, "p2_u0" of several."""
         return face if self.is_single else face_label(patch, face)
+
+    @cached_property
+    def groups(self) -> tuple[PatchGroup, ...]:
+        """Return the patches in groups of equal degrees and knots, in the order of their first patches."""
+        return groups_of(self.patches)
 
     @cached_property
     def numbering(self) -> tuple[tuple[IntArray, ...], int]:
