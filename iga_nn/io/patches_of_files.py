@@ -8,7 +8,8 @@ import numpy as np
 
 from parameterize.arrays import Array
 from parameterize.spline.body import FLAT, TOLERANCE, Body, net_area
-from parameterize.spline.interface import Face, face_label, face_layer, gap, orientations
+from parameterize.spline.interface import Face, face_label, face_layer, orientations
+from parameterize.spline.interface_rows import gaps, rows_of
 from parameterize.spline.volume import LARGEST, BSplineVolume
 
 log = logging.getLogger(__name__)
@@ -84,7 +85,7 @@ def _compare(body: Body, declared: Sequence[frozenset[Face]]) -> None:
         if any(patch >= len(body) for patch, _ in faces):
             raise ValueError(f"interface {names}: there are {len(body)} patches, counted from 0")
         if pair not in found and all(_has_area(body, face) for face in faces):
-            apart = min(gap(body.patches, way) for way in orientations(faces[0], faces[-1]))
+            apart = gaps(body.groups, rows_of(orientations(faces[0], faces[-1]))).min()
             reason = "or weights do not fit together"
             if np.isfinite(apart):
                 share = apart / body.size
@@ -99,4 +100,4 @@ def _compare(body: Body, declared: Sequence[frozenset[Face]]) -> None:
 def _has_area(body: Body, face: Face) -> bool:
     """Return whether a face is a surface, and not shrunk to an edge or a point, where nothing is glued."""
     net = face_layer(body.patches[face[0]].control_points, face[1])
-    return net_area(net) > FLAT * body.size**2
+    return bool(net_area(net) > FLAT * body.size**2)

@@ -2,8 +2,7 @@
 
 Rational patches also have p0_weights, ..
 
-A row of `interfaces` has seven whole numbers: patch and face of the one side, patch and face of the other, whether the
-axes are exchanged, and which of them are reversed, as in `Interface`. Faces count as in FACE_NAMES.
+A row of `interfaces` has seven whole numbers, see interface_rows.py.
 """
 
 from collections.abc import Sequence
@@ -14,9 +13,8 @@ import numpy as np
 from ..arrays import Array
 from ..files import array_names, load_arrays, save_arrays
 from .interface import Interface
+from .interface_rows import COLUMNS, interfaces_of, rows_of
 from .volume import AXES, FACE_NAMES, BSplineVolume
-
-COLUMNS = 7  # of a row of `interfaces`
 
 
 def save_patches(path: str | Path, patches: Sequence[BSplineVolume], interfaces: Sequence[Interface]) -> None:
@@ -27,8 +25,7 @@ def save_patches(path: str | Path, patches: Sequence[BSplineVolume], interfaces:
         arrays |= {f"p{number}_{name}": array for name, array in parts.items()}
         if patch.weights is not None:
             arrays[f"p{number}_weights"] = patch.weights
-    rows = np.array([_row(interface) for interface in interfaces], dtype=np.int64).reshape(-1, COLUMNS)
-    save_arrays(path, interfaces=rows, **arrays)
+    save_arrays(path, interfaces=rows_of(interfaces), **arrays)
 
 
 def load_patches(path: str | Path) -> tuple[tuple[BSplineVolume, ...], tuple[Interface, ...]]:
@@ -50,7 +47,7 @@ def load_patches(path: str | Path) -> tuple[tuple[BSplineVolume, ...], tuple[Int
         raise ValueError(f"{path}: interfaces must have {COLUMNS} whole numbers a row")
     if not np.isin(rows[:, [1, 3]], np.arange(len(FACE_NAMES))).all():
         raise ValueError(f"{path}: interfaces name a face that there is not: faces are 0 to {len(FACE_NAMES) - 1}")
-    return tuple(patches), tuple(_interface(*row) for row in rows.tolist())
+    return tuple(patches), interfaces_of(rows)
 
 
 def is_of_patches(path: str | Path) -> bool:
@@ -60,14 +57,3 @@ def is_of_patches(path: str | Path) -> bool:
 
 def _names() -> tuple[str, ...]:
     return ("degrees", *(f"knots_{axis}" for axis in AXES), "control_points")
-
-
-def _row(interface: Interface) -> tuple[int, ...]:
-    (p, face_p), (q, face_q) = interface.first, interface.second
-    faces = FACE_NAMES.index(face_p), FACE_NAMES.index(face_q)
-    return p, faces[0], q, faces[1], int(interface.swapped), *map(int, interface.flipped)
-
-
-def _interface(p: int, face_p: int, q: int, face_q: int, swapped: int, a: int, b: int) -> Interface:
-    first, second = (p, FACE_NAMES[face_p]), (q, FACE_NAMES[face_q])
-    return Interface(first, second, bool(swapped), (bool(a), bool(b)))

@@ -3,6 +3,8 @@
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import compress
+from math import prod
 from numbers import Real
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,20 +15,11 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from ..arrays import Array, IntArray, Mask
+from ..arrays import Array, Floats, IntArray, Mask
 from ..display import Brief, Shown, above
 from .archive import is_of_patches, load_patches, save_patches
-from .interface import (
-    WEIGHT_TOLERANCE,
-    Face,
-    Interface,
-    axis_side,
-    face_label,
-    face_layer,
-    gap,
-    knots_agree,
-    orientations,
-)
+from .interface import WEIGHT_TOLERANCE, Face, Interface, axis_side, face_label, face_layer, knots_agree
+from .interface_rows import face_numbers, gaps, interfaces_of, kinds, oriented, rows_of
 from .patch_groups import PatchGroup, groups_of
 from .volume import FACE_NAMES, BSplineVolume, demand_volume
 
@@ -80,21 +73,29 @@ class Body(Brief, Shown):
             raise ValueError("a body has one patch or more")
         for patch in self.patches:
             demand_volume(patch)
-        seen: set[Face] = set()
         for interface in self.interfaces:
             if not isinstance(interface, Interface):
                 raise TypeError(f"interfaces must be Interface objects, got {interface!r:.80}")
-            for number, face in (interface.first, interface.second):
-                if not 0 <= number < len(self.patches):
-                    raise ValueError(f"interface {interface}: there are {len(self.patches)} patches, from 0 on")
-                if (number, face) in seen:
-                    raise ValueError(f"{face_label(number, face)} is glued twice")
-                seen.add((number, face))
-            if not knots_agree(self.patches, interface):
-                raise ValueError(f"interface {interface}: degrees or knots along the two faces differ")
-            if gap(self.patches, interface) > 0.0:
-                raise ValueError(f"interface {interface}: the control points or weights of the two faces differ")
-        if len(seen) == len(FACE_NAMES) * len(self.patches):
+        if self.interfaces:
+            self._check_interfaces()
+
+    def _check_interfaces(self) -> None:
+        """Raise ValueError for interfaces of other patches, of a face that is glued twice, or without equal traces."""
+        rows = self.interface_rows
+        outside = ((rows[:, [0, 2]] < 0) | (rows[:, [0, 2]] >= len(self))).any(axis=1)
+        if outside.any():
+            unknown = self.interfaces[int(outside.argmax())]
+            raise ValueError(f"interface {unknown}: there are {len(self)} patches, from 0 on")
+        faces, counts = np.unique(face_numbers(rows), return_counts=True)
+        if counts.max() > 1:
+            raise ValueError(f"{face_label(*_face(int(faces[counts.argmax()])))} is glued twice")
+        apart = gaps(self.groups, rows) > 0.0
+        if apart.any():
+            wrong = self.interfaces[int(apart.argmax())]
+            if not knots_agree(self.patches, wrong):
+                raise ValueError(f"interface {wrong}: degrees or knots along the two faces differ")
+            raise ValueError(f"interface {wrong}: the control points or weights of the two faces differ")
+        if len(faces) == len(FACE_NAMES) * len(self):
             raise ValueError("every face is glued, so that the body has no boundary: is a patch given twice?")
 
     @classmethod
@@ -114,9 +115,8 @@ class Body(Brief, Shown):
         if not (isinstance(tolerance, Real) and 0.0 <= tolerance < 1.0):
             raise ValueError(f"tolerance must be a share of the body's size, from 0 to 1, got {tolerance!r:.80}")
         size = size_of(given)
-        found = tuple(_interfaces(given, tolerance * size, size))
-        labels, _ = shared_numbers([patch.shape for patch in given], found)
-        return cls(_merged(given, labels), found)
+        found = interfaces_of(_matches(given, tolerance * size, size))
+        return cls(_merged(given, found), found)
 
     @classmethod
     def from_splinepy(cls, splines: Any) -> "Body":
@@ -237,25 +237,35 @@ class Body(Brief, Shown):
         default tolerance are not looked at.
         """
         try:
-            found = list(_interfaces(self.patches, NEAR * TOLERANCE * self.size, self.size))
+            rows = _matches(self.patches, NEAR * TOLERANCE * self.size, self.size)
         except ValueError:  # faces that from_patches would refuse: they are no pair
             return []
-        glued = {interface.first for interface in self.interfaces}
-        return [(one, gap(self.patches, one)) for one in found if one.first not in glued]
+        rows = rows[~self.glued[rows[:, 0], rows[:, 1]]]
+        return list(zip(interfaces_of(rows), gaps(self.groups, rows).tolist(), strict=True))
 
     @property
     def parts(self) -> list[list[int]]:
         """Return the numbers of the patches that are connected through interfaces, one list a part."""
-        pairs = np.array([(i.first[0], i.second[0]) for i in self.interfaces], dtype=np.int64).reshape(-1, 2)
-        graph = coo_array((np.ones(len(pairs), dtype=np.int8), pairs.T), shape=(len(self),) * 2)
-        count, labels = connected_components(graph, directed=False)
-        return [np.flatnonzero(labels == part).tolist() for part in range(count)]
+        labels = numbers_of_classes(len(self), self.interface_rows[:, [0, 2]].T)
+        begins = np.cumsum(np.bincount(labels))[:-1]
+        return [part.tolist() for part in np.split(np.argsort(labels, kind="stable"), begins)]
+
+    @cached_property
+    def interface_rows(self) -> IntArray:
+        """Return the interfaces as rows (k, 7), see interface_rows.py."""
+        return rows_of(self.interfaces)
+
+    @cached_property
+    def glued(self) -> Mask:
+        """Return whether each face of each patch is glued, (patches, 6) in the order of FACE_NAMES."""
+        glued = np.zeros(len(FACE_NAMES) * len(self), dtype=bool)
+        glued[face_numbers(self.interface_rows)] = True
+        return glued.reshape(len(self), len(FACE_NAMES))
 
     @cached_property
     def outer(self) -> tuple[tuple[str, ...], ...]:
         """Return for each patch the names of the faces that are not glued: together they are the body's boundary."""
-        glued = {face for interface in self.interfaces for face in (interface.first, interface.second)}
-        return tuple(tuple(name for name in FACE_NAMES if (i, name) not in glued) for i in range(len(self.patches)))
+        return tuple(tuple(compress(FACE_NAMES, row)) for row in (~self.glued).tolist())
 
     @property
     def outer_faces(self) -> list[Face]:
@@ -307,16 +317,25 @@ def shared_numbers(
     Coefficients that the interfaces make one have the same number. Numbers begin with 0, in the order in which the
     coefficients of the patches come.
     """
-    sizes = [int(np.prod(shape)) for shape in shapes]
-    starts = [0, *np.cumsum(sizes).tolist()]
-    rows = [np.arange(a, b).reshape(shape) for a, b, shape in zip(starts, starts[1:], shapes, strict=False)]
-    pairs: list[Any] = [np.empty((2, 0), dtype=np.int64)]
-    for interface in interfaces:
-        (p, face_p), (q, face_q) = interface.first, interface.second
-        first, second = face_layer(rows[p], face_p), interface.turned(face_layer(rows[q], face_q))
-        pairs.append(np.stack([first.ravel(), second.ravel()]))
-    numbers = numbers_of_classes(starts[-1], np.concatenate(pairs, axis=1))
-    return tuple(numbers[row] for row in rows), int(numbers.max()) + 1
+    sizes = np.array([prod(shape) for shape in shapes])
+    starts = np.cumsum(sizes) - sizes
+    labels = {shape: label for label, shape in enumerate(dict.fromkeys(shapes))}
+    own = [np.arange(prod(shape)).reshape(shape) for shape in labels]
+    rows = rows_of(interfaces)
+    pairs = [np.empty((2, 0), dtype=np.int64)]
+    for kind, members in kinds(rows, np.array([labels[shape] for shape in shapes])):
+        (p, face_p), (q, face_q) = kind.first, kind.second
+        layers = np.stack([face_layer(own[p], face_p), kind.turned(face_layer(own[q], face_q))]).reshape(2, 1, -1)
+        pairs.append((starts[rows[members][:, [0, 2]]].T[..., None] + layers).reshape(2, -1))
+    numbers = numbers_of_classes(int(sizes.sum()), np.concatenate(pairs, axis=1))
+    return tuple(parted(numbers, shapes)), int(numbers.max()) + 1
+
+
+def parted(values: Floats, shapes: Sequence[tuple[int, ...]]) -> Iterator[Floats]:
+    """Yield the values (n, ...) of all coefficients patch by patch, in the patches' shapes."""
+    ends = np.cumsum([prod(shape) for shape in shapes])
+    for part, shape in zip(np.split(values, ends[:-1]), shapes, strict=True):
+        yield part.reshape(*shape, *values.shape[1:])
 
 
 def numbers_of_classes(count: int, pairs: IntArray) -> IntArray:
@@ -325,27 +344,28 @@ def numbers_of_classes(count: int, pairs: IntArray) -> IntArray:
     Classes have the numbers from 0 on, in the order in which their first members come.
     """
     graph = coo_array((np.ones(pairs.shape[1], dtype=np.int8), (pairs[0], pairs[1])), shape=(count,) * 2)
-    _, first_places, groups = np.unique(
-        connected_components(graph, directed=False)[1], return_index=True, return_inverse=True
-    )
-    order: IntArray = np.empty(len(first_places), dtype=np.int64)
-    order[np.argsort(first_places)] = np.arange(len(first_places))
-    return order[groups]
+    classes, labels = connected_components(graph, directed=False)
+    first = np.full(classes, count)
+    np.minimum.at(first, labels, np.arange(count))
+    rank = np.zeros(count, dtype=np.int64)
+    rank[first] = 1
+    return np.asarray(np.cumsum(rank)[first[labels]] - 1)
 
 
-def _merged(patches: Sequence[BSplineVolume], labels: Sequence[IntArray]) -> tuple[BSplineVolume, ...]:
-    """Return the patches with one control point for each label, the first that has it.
+def _merged(patches: Sequence[BSplineVolume], interfaces: Sequence[Interface]) -> tuple[BSplineVolume, ...]:
+    """Return the patches with one control point where interfaces make several one, the first of them.
 
     Its weight goes with it, except to patches whose weights there are other ones by a factor.
     """
-    every = np.concatenate([label.ravel() for label in labels])
-    points = all_control_points(patches)
-    _, first = np.unique(every, return_index=True)
-    own = [np.ones(patch.shape) if patch.weights is None else patch.weights for patch in patches]
-    chosen, weights = points[first], np.concatenate([row.ravel() for row in own])[first]
+    shapes = [patch.shape for patch in patches]
+    labels = np.concatenate([part.ravel() for part in shared_numbers(shapes, interfaces)[0]])
+    first = np.flatnonzero(np.diff(np.maximum.accumulate(labels), prepend=-1))  # of each number, which come in order
+    points = all_control_points(patches)[first][labels]
+    own = np.concatenate([np.ones(p.shape).ravel() if p.weights is None else p.weights.ravel() for p in patches])
+    weights = np.where(_alike(own[first][labels], own), own[first][labels], own)
     return tuple(
-        replace(patch, control_points=chosen[label], weights=np.where(_alike(weights[label], row), weights[label], row))
-        for patch, label, row in zip(patches, labels, own, strict=True)
+        replace(patch, control_points=net, weights=row)
+        for patch, net, row in zip(patches, parted(points, shapes), parted(weights, shapes), strict=True)
     )
 
 
@@ -353,32 +373,73 @@ def _alike(one: Array, other: Array) -> Mask:
     return np.abs(one - other) <= WEIGHT_TOLERANCE * other
 
 
-def _interfaces(patches: Sequence[BSplineVolume], tolerance: float, size: float) -> Iterator[Interface]:
-    """Yield the pairs of faces with the same control points; raise ValueError for those that nearly match."""
-    faces = [(i, name) for i in range(len(patches)) for name in FACE_NAMES]
-    nets = [face_layer(patches[i].control_points, name) for i, name in faces]
-    has_area = [net_area(net) > FLAT * size**2 for net in nets]
-    middles = np.array([_corners(net).mean(axis=0) for net in nets])
-    taken: dict[int, int] = {}
-    for i, j in sorted(cKDTree(middles).query_pairs(2.0 * tolerance)):
-        if not (has_area[i] and has_area[j]) or not _same_points(_corners(nets[i]), _corners(nets[j]), tolerance):
-            continue
-        ways = (way for way in orientations(faces[i], faces[j]) if knots_agree(patches, way))
-        way = next((way for way in ways if gap(patches, way) <= tolerance), None)
-        if way is None:
-            one, other = (_samples(patches[p], name) for p, name in (faces[i], faces[j]))
-            if _same_points(one, other, tolerance):
-                raise ValueError(
-                    f"{face_label(*faces[i])} and {face_label(*faces[j])} are the same surface, but of other degrees, "
-                    "knots or weights: give both faces the same ones"
-                )
-            continue  # two surfaces over the same corners
-        for k, partner in ((i, j), (j, i)):
-            if k in taken:
-                names = ", ".join(face_label(*faces[m]) for m in (k, partner, taken[k]))
-                raise ValueError(f"{names} are one surface: at most two patches meet at a face")
-            taken[k] = partner
-        yield way
+def _matches(patches: Sequence[BSplineVolume], tolerance: float, size: float) -> IntArray:
+    """Return the pairs of faces with the same control points as rows (k, 7), see interface_rows.py.
+
+    Raises ValueError for pairs that nearly match, and where three faces are one.
+    """
+    groups = groups_of(patches)
+    corners, areas = _faces(groups)
+    solid = np.flatnonzero(areas > FLAT * size**2)
+    near = cKDTree(corners[solid].mean(axis=1)).query_pairs(2.0 * tolerance, output_type="ndarray")
+    pairs = solid[near[np.lexsort(near.T[::-1])]]
+    pairs = pairs[_same_points(corners[pairs[:, 0]], corners[pairs[:, 1]], tolerance)]
+    rows, others = oriented(groups, pairs, tolerance)
+    for pair in pairs[others].tolist():
+        _refuse_one_surface(patches, [_face(number) for number in pair], tolerance)
+    _refuse_three(face_numbers(rows).ravel())
+    return rows
+
+
+def _faces(groups: Sequence[PatchGroup]) -> tuple[Array, Array]:
+    """Return the corners (faces, 4, 3) and the areas (faces,) of the faces of all patches, six a patch."""
+    count = sum(map(len, groups))
+    corners, areas = np.empty((count, len(FACE_NAMES), 4, 3)), np.empty((count, len(FACE_NAMES)))
+    for group in groups:
+        for number, name in enumerate(FACE_NAMES):
+            nets = face_layer(np.moveaxis(group.control_points, 0, 3), name)  # (n_a, n_b, k, 3)
+            ends = nets[:: len(nets) - 1, :: nets.shape[1] - 1]
+            corners[group.numbers, number] = np.moveaxis(ends.reshape(4, -1, 3), 1, 0)
+            areas[group.numbers, number] = net_area(nets)
+    return corners.reshape(-1, 4, 3), areas.ravel()
+
+
+def net_area(net: Array) -> Floats:
+    """Return the areas (...) of control nets (n_a, n_b, ..., 3) of faces, each the sum over its cells."""
+    a, b = np.diff(net, axis=0)[:, :-1], np.diff(net, axis=1)[:-1]
+    return np.asarray(np.linalg.norm(np.cross(a, b), axis=-1).sum(axis=(0, 1)))
+
+
+def _same_points(one: Array, other: Array, tolerance: float) -> Mask:
+    """Return whether each point of either set (m, k, 3) lies within the tolerance of one of the other set, (m,)."""
+    distances = np.linalg.norm(one[:, :, None] - other[:, None], axis=-1)
+    return np.asarray(np.maximum(distances.min(axis=1), distances.min(axis=2)).max(axis=1) <= tolerance)
+
+
+def _face(number: int) -> Face:
+    """Return patch and name of the face 6 * patch + face."""
+    patch, face = divmod(number, len(FACE_NAMES))
+    return patch, FACE_NAMES[face]
+
+
+def _refuse_one_surface(patches: Sequence[BSplineVolume], faces: Sequence[Face], tolerance: float) -> None:
+    """Raise ValueError where two faces over the same corners, which do not lie on each other, are the same surface."""
+    one, other = (_samples(patches[number], name) for number, name in faces)
+    if _same_points(one[None], other[None], tolerance).all():
+        raise ValueError(
+            f"{face_label(*faces[0])} and {face_label(*faces[1])} are the same surface, but of other degrees, "
+            "knots or weights: give both faces the same ones"
+        )
+
+
+def _refuse_three(faces: IntArray) -> None:
+    """Raise ValueError where a face comes twice among faces, of which each two neighbours are a pair."""
+    again = np.setdiff1d(np.arange(len(faces)), np.unique(faces, return_index=True)[1])
+    if len(again):
+        second = int(again[0])
+        first = int((faces == faces[second]).argmax())
+        names = ", ".join(face_label(*_face(int(faces[k]))) for k in (second, second ^ 1, first ^ 1))
+        raise ValueError(f"{names} are one surface: at most two patches meet at a face")
 
 
 def _samples(volume: BSplineVolume, face: str) -> Array:
@@ -387,20 +448,3 @@ def _samples(volume: BSplineVolume, face: str) -> Array:
     even = np.linspace(0.0, 1.0, SAMPLES)
     u, v, w = (np.array([float(side)]) if a == axis else even for a in range(3))
     return volume.grid(u, v, w).reshape(-1, 3)
-
-
-def _corners(net: Array) -> Array:
-    """Return the four corners (4, 3) of a face's control points (n_a, n_b, 3)."""
-    return net[:: len(net) - 1, :: net.shape[1] - 1].reshape(4, 3)
-
-
-def net_area(net: Array) -> float:
-    """Return the area of a face's control net, sum over its cells."""
-    a, b = np.diff(net, axis=0)[:, :-1], np.diff(net, axis=1)[:-1]
-    return float(np.linalg.norm(np.cross(a, b), axis=-1).sum())
-
-
-def _same_points(one: Array, other: Array, tolerance: float) -> bool:
-    """Return whether each point of either set (k, 3) lies within the tolerance of one of the other set."""
-    ways = ((one, other), (other, one))
-    return all(float(np.max(cKDTree(b).query(a)[0])) <= tolerance for a, b in ways)

@@ -1,4 +1,4 @@
-"""Defines Interface: two faces of patches that are one surface, and finds it from the control points of the faces."""
+"""Defines Interface: two faces of patches that are one surface, with the names and the layers of faces."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -7,6 +7,7 @@ from itertools import product
 import numpy as np
 
 from ..arrays import Floats
+from .patch_groups import PatchGroup
 from .volume import FACE_NAMES, BSplineVolume
 
 KNOT_TOLERANCE = 1e-9  # of the interval [0, 1]: files give knots in decimals, and reversed ones are rounded
@@ -95,7 +96,7 @@ def varying(face: str) -> tuple[int, int]:
 def face_layer(array: Floats, face: str) -> Floats:
     """Return the layer (m_a, m_b, ...) of an array (n_u, n_v, n_w, ...) of a patch that belongs to a face."""
     axis, side = axis_side(face)
-    return np.take(array, -1 if side else 0, axis=axis)
+    return array[(slice(None),) * axis + (-side,)]
 
 
 def outward(layer: Floats, face: str) -> Floats:
@@ -113,8 +114,11 @@ def orientations(first: Face, second: Face) -> Iterator[Interface]:
         yield Interface(first, second, swapped, (a, b))
 
 
-def knots_agree(patches: Sequence[BSplineVolume], interface: Interface) -> bool:
-    """Return whether degrees and knots along the two faces of an interface are the same, up to KNOT_TOLERANCE."""
+def knots_agree(patches: Sequence[BSplineVolume] | Sequence[PatchGroup], interface: Interface) -> bool:
+    """Return whether degrees and knots along the two faces of an interface are the same, up to KNOT_TOLERANCE.
+
+    Of groups of patches, the numbers in the interface are those of the groups.
+    """
     p, q = interface.first[0], interface.second[0]
     for axis_p, axis_q, flip in interface.directions:
         row, other = patches[p].knots[axis_p], patches[q].knots[axis_q]
@@ -123,25 +127,3 @@ def knots_agree(patches: Sequence[BSplineVolume], interface: Interface) -> bool:
         if np.abs(row - (1.0 - other[::-1] if flip else other)).max() > KNOT_TOLERANCE:
             return False
     return True
-
-
-def gap(patches: Sequence[BSplineVolume], interface: Interface) -> float:
-    """Return the largest distance of two control points of an interface that should be one.
-
-    It is infinite for nets of other shapes, and where the weights of the two faces differ by more than a factor.
-    """
-    layers = [_net(patches[p], face) for p, face in (interface.first, interface.second)]
-    first, second = layers[0], interface.turned(layers[1])
-    if first.shape != second.shape:
-        return float("inf")
-    factors = first[..., 3] / second[..., 3]
-    if factors.max() > (1.0 + WEIGHT_TOLERANCE) * factors.min():
-        return float("inf")
-    return float(np.linalg.norm((first - second)[..., :3], axis=-1).max())
-
-
-def _net(patch: BSplineVolume, face: str) -> Floats:
-    """Return the control points of a face with their weights, (n_a, n_b, 4)."""
-    points = face_layer(patch.control_points, face)
-    weights = np.ones(points.shape[:2]) if patch.weights is None else face_layer(patch.weights, face)
-    return np.concatenate([points, weights[..., None]], axis=-1)
