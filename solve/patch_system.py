@@ -70,6 +70,10 @@ class PatchSystem(PatchProblem):
         """Return the loads minus the matrix times the known coefficients."""
         return self.loads - self.matrix.apply(self.known)
 
+    def with_matrix(self, matrix: Operator | FormOperator) -> "PatchSystem":
+        """Return the same system whose matrix shares its arrays with those of other patches."""
+        return replace(self, matrix=matrix, operators=(matrix,) if isinstance(matrix, Operator) else self.operators)
+
     def at_rest(self) -> "PatchSystem":
         """Return the same system with the value zero wherever values are given."""
         return replace(self, known=np.zeros_like(self.known))

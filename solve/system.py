@@ -20,8 +20,10 @@ from .assembly import balanced
 from .diagnostics import ConvergenceError, failure, judge, map_notices
 from .discretization.error_norms import Compared, Errors, error_norms, missing_mean
 from .discretization.estimate import error_estimate
+from .discretization.grouped import BodyMatrix
+from .discretization.groups import Layout
 from .discretization.on_regions import demand_area, demand_supports
-from .discretization.operator import FormOperator, MatrixFree, Operator, assemble
+from .discretization.operator import FormOperator, Operator, assemble
 from .discretization.space import TrialSpace, embedded, longest_edge
 from .discretization.unknowns import Glued, Unknowns, unknowns_of
 from .field import BodyField, FieldOnBody, SplineField
@@ -84,6 +86,7 @@ class System:
     body: Body
     problem: BoundaryValueProblem
     patches: tuple[PatchSystem, ...]
+    matrix: BodyMatrix  # of all patches
     unknowns: Unknowns
     blocks: tuple[Preconditioner, ...]  # a component each
     right: Array  # b, (c, ...): of the free coefficients
@@ -101,17 +104,17 @@ class System:
 
     def product(self, x: Array) -> Array:
         """Return A times the free coefficients (c, ...)."""
-        return self._product(x, [patch.matrix for patch in self.patches])
+        return self._product(x, self.matrix)
 
-    def _product(self, x: Array, matrices: Sequence[MatrixFree]) -> Array:
-        parts = zip(matrices, self.unknowns.spread(x), strict=True)
-        return self.unknowns.collect([matrix.apply(full) for matrix, full in parts])
+    def _product(self, x: Array, matrix: BodyMatrix) -> Array:
+        return self.unknowns.collect(matrix.apply(self.unknowns.spread(x)))
 
     @functools.cached_property
     def mass(self) -> LinearOperator:
         """Return the mass matrix, the integrals of u . v."""
         each = [assemble(patch.volume, patch.space, Mass(), threads=patch.matrix.threads)[0] for patch in self.patches]
-        return self._linear(lambda x: self._product(x, each))
+        whole = BodyMatrix.of(self.matrix.layout, each)
+        return self._linear(lambda x: self._product(x, whole))
 
     @property
     def load(self) -> Array:
@@ -343,6 +346,8 @@ def build(
     start = time.process_time()
     with one_blas_thread():
         systems = tuple(PatchSystem.of(patch, options, shift) for patch in patches)
+        matrix = BodyMatrix.of(Layout.of([patch.space for patch in patches]), [one.matrix for one in systems])
+        systems = tuple(one.with_matrix(own) for one, own in zip(systems, matrix.parts, strict=True))
         _demand_held(body, problem, systems, is_loose)
         unknowns = unknowns_of([patch.space for patch in systems], body.interfaces)
         known = unknowns.completed([system.known for system in systems])
@@ -357,7 +362,7 @@ def build(
         right = unknowns.collect([system.right for system in systems])
         right = balanced(right, unknowns, systems[0].space) if blocks[0].singular and not is_loose else right
         setup = time.process_time() - start
-    return System(body, problem, systems, unknowns, blocks, right, setup)
+    return System(body, problem, systems, matrix, unknowns, blocks, right, setup)
 
 
 def _demand_held(body: Body, problem: BoundaryValueProblem, systems: Sequence[PatchSystem], is_loose: bool) -> None:

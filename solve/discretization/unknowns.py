@@ -15,6 +15,7 @@ from parameterize.arrays import Array, IntArray, Mask
 from parameterize.spline.body import shared_numbers
 from parameterize.spline.interface import Interface
 
+from .groups import Layout, OnPatches
 from .space import TrialSpace
 
 
@@ -29,7 +30,7 @@ class Unknowns(Protocol):
     def shape(self) -> tuple[int, ...]:
         """Return the shape of one component of a vector."""
 
-    def spread(self, x: Array) -> list[Array]:
+    def spread(self, x: Array) -> Sequence[Array]:
         """Return the coefficients (c, n_u, n_v, n_w) of each patch of a vector (c, ...), zero where they are fixed."""
 
     def collect(self, integrals: Sequence[Array]) -> Array:
@@ -131,40 +132,51 @@ class Glued:
         return (int(self.count - self.fixed.sum()),)
 
     @cached_property
+    def layout(self) -> Layout:
+        """Return where the coefficients of each patch stand in an array of all."""
+        return Layout.of(self.spaces)
+
+    @cached_property
     def places(self) -> list[IntArray]:
         """Return for each patch the place (n_u, n_v, n_w) of each coefficient in a vector; its length where fixed."""
         order = np.where(self.fixed, self.shape[0], np.cumsum(~self.fixed) - 1)
         return [order[own] for own in self.numbers]
 
-    def spread(self, x: Array) -> list[Array]:
+    def spread(self, x: Array) -> OnPatches:
         """Return the coefficients (c, n_u, n_v, n_w) of each patch of a vector (c, m), zero where they are fixed."""
         padded = np.concatenate([x, np.zeros((len(x), 1))], axis=1)
-        return [padded[:, own] for own in self.places]
+        return OnPatches(self.layout, len(x), padded.ravel()[self._entries(len(x))])
 
     def collect(self, integrals: Sequence[Array]) -> Array:
         """Return the vector (c, m) of integrals (c, n_u, n_v, n_w) over each patch, copies added."""
-        return np.ascontiguousarray(self._sums(integrals, self.places, self.shape[0] + 1)[:, :-1])
+        parts = self.layout.joined(integrals)
+        sums = np.bincount(self._entries(parts.components), parts.flat, parts.components * (self.shape[0] + 1))
+        return np.ascontiguousarray(sums.reshape(parts.components, -1)[:, :-1])
 
     def assembled(self, integrals: Sequence[Array]) -> Array:
         """Return the integrals (c, count) of all coefficients, copies added."""
-        return self._sums(integrals, self.numbers, self.count)
+        parts = self.layout.joined(integrals)
+        rows = self.layout.numbers(self.numbers, parts.components, self.count)
+        sums = np.bincount(rows, parts.flat, parts.components * self.count).astype(np.float64, copy=False)
+        return sums.reshape(parts.components, -1)
 
     def chosen(self, coefficients: Sequence[Array]) -> Array:
         """Return the vector (c, m) of the coefficients of a function that is continuous across interfaces."""
-        padded = np.zeros((len(coefficients[0]), self.shape[0] + 1))
-        for own, part in zip(self.places, coefficients, strict=True):
-            padded[:, own] = part
+        parts = self.layout.joined(coefficients)
+        padded = np.zeros((parts.components, self.shape[0] + 1))
+        padded.ravel()[self._entries(parts.components)] = parts.flat
         return padded[:, :-1].copy()
 
-    @staticmethod
-    def _sums(parts: Sequence[Array], rows: Sequence[IntArray], length: int) -> Array:
-        every = np.concatenate([row.ravel() for row in rows])
-        return np.stack(
-            [
-                np.bincount(every, np.concatenate([part[c].ravel() for part in parts]), length)
-                for c in range(len(parts[0]))
-            ]
-        )
+    def _entries(self, components: int) -> IntArray:
+        """Return the place of each entry of an array of all patches in a vector (c, m + 1); m is that of fixed ones."""
+        if components not in self._known_entries:
+            entries = self.layout.numbers(self.places, components, self.shape[0] + 1)
+            self._known_entries[components] = entries
+        return self._known_entries[components]
+
+    @cached_property
+    def _known_entries(self) -> dict[int, IntArray]:
+        return {}
 
     @cached_property
     def owned(self) -> list[Mask]:

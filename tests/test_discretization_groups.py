@@ -1,0 +1,59 @@
+"""Patches of one shape are one array: the same numbers as patch by patch."""
+
+import numpy as np
+import pytest
+
+import iga_nn
+from solve.discretization.grouped import BodyMatrix
+from solve.discretization.groups import Layout
+from solve.discretization.space import trial_space
+
+
+def row_of(counts, degree=2):
+    """Return a row of blocks along x, one for each number of control points along x."""
+    return iga_nn.Body.from_patches(
+        [
+            iga_nn.BSplineVolume.from_function(
+                lambda u, v, w, a=a: (a + u + 0.1 * np.sin(3 * v) * w, v, w + 0.1 * u * v), (count, 4, 3), degree
+            )
+            for a, count in enumerate(counts)
+        ]
+    )
+
+
+def test_patches_of_one_shape_stand_side_by_side():
+    spaces = [trial_space(volume) for volume in row_of((3, 4, 3, 3)).patches]
+    layout = Layout.of(spaces)
+    assert layout.groups == ((0, 2, 3), (1,))
+    parts = [np.random.default_rng(i).standard_normal((2, *space.shape)) for i, space in enumerate(spaces)]
+    joined = layout.joined(parts)
+    assert layout.joined(joined) is joined
+    assert all(np.array_equal(*pair) for pair in zip(joined, parts, strict=True))
+    first, second = joined.in_groups
+    assert np.array_equal(first, np.stack([parts[0], parts[2], parts[3]], axis=0))
+    second += 1.0
+    assert np.array_equal(joined[1], parts[1] + 1.0)  # no copy
+    assert [part.shape for part in joined[2:]] == [part.shape for part in parts[2:]]
+
+
+@pytest.mark.parametrize(
+    "problem",
+    [
+        iga_nn.Poisson(source="1", kappa={0: "1+x", 1: 2, 2: 3, 3: 1}, reaction="x", robin={"v1": ("2", "0")}),
+        iga_nn.Elasticity(body_force=("0", "0", "1"), young={0: 1, 1: 2, 2: 3, 3: 4}, fix="x < 0.1", spring={"v1": 3}),
+    ],
+)
+def test_a_body_multiplies_as_its_patches_do(problem):
+    system = iga_nn.discretize(row_of((3, 4, 3, 3)), problem)
+    x = np.random.default_rng(0).standard_normal((system.problem.form.components, *system.unknowns.shape))
+    each = [patch.matrix.apply(own) for patch, own in zip(system.patches, system.unknowns.spread(x), strict=True)]
+    expected = system.unknowns.collect(each)
+    assert len(system.matrix.stacks) == 1 and len(system.matrix.alone) == 1
+    assert system.product(x) == pytest.approx(expected, rel=1e-12, abs=1e-12 * np.abs(expected).max())
+
+
+def test_patches_share_the_arrays_of_their_stack():
+    system = iga_nn.discretize(row_of((3, 3)), iga_nn.Poisson(source="1"))
+    assert isinstance(system.matrix, BodyMatrix)
+    ((_, stack),) = system.matrix.stacks
+    assert all(np.shares_memory(stack.factors, patch.matrix.factors) for patch in system.patches)
