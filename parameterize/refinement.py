@@ -29,6 +29,7 @@ from .quality.distances import two_sided
 from .quality.distortion import arap_grid, own_boxes
 from .spline.body import shared_numbers
 from .spline.bspline import breakpoints, midpoints
+from .spline.patch_groups import group_of
 from .spline.spline_map import ControlNets, SplineMap, tied_spans
 from .spline.volume import AXES
 
@@ -277,7 +278,7 @@ def _nearly_folded(spline: SplineMap) -> IntArray:
     """Return the spans (k, 4) with a Bernstein coefficient of det J that the penalty would raise."""
     found = []
     for block, box in enumerate(_boxes(spline)):
-        form = DeterminantForm(spline.patch(block))
-        low = np.ldexp(form.survey()[0], form.exponent) < MIN_COEFFICIENT * np.prod(box)
-        found.append(form.numbers(np.flatnonzero(low)))
+        form = DeterminantForm(group_of(spline.patch(block)))
+        low = np.ldexp(form.survey()[0][0, 0], form.exponents) < MIN_COEFFICIENT * np.prod(box)
+        found.append(form.numbers(np.flatnonzero(low))[:, 1:])
     return in_blocks(found)

@@ -65,17 +65,16 @@ def test_sides_of_an_interface_are_those_of_the_derivatives_across(second):
         ways = [SYMMETRIES[k] for k in rng.integers(len(SYMMETRIES), size=2)]
         body = Body.from_patches([turned(one, way) for one, way in zip((first, patch(second)), ways, strict=True)])
         (interface,) = body.interfaces
-        signs = [int(np.sign(np.linalg.det(one.jacobian([[0.5, 0.5, 0.5]])[0]))) for one in body]
+        signs = np.array([int(np.sign(np.linalg.det(one.jacobian([[0.5, 0.5, 0.5]])[0]))) for one in body])
         a, b = (outward(body.patches[k], face) for k, face in (interface.first, interface.second))
-        assert on_one_side(interface, signs) == (a @ b > 0.0)
+        assert on_one_side(body.interface_rows, signs).tolist() == [a @ b > 0.0]
 
 
 def test_faces_of_one_patch_that_turn_around_a_line():
     """Directions of the two faces of these interfaces run alike although their axes have other names."""
-    for interface in around_a_line(4).interfaces:
-        assert not on_one_side(interface, [1] * 4)
+    assert not on_one_side(around_a_line(4).interface_rows, np.ones(4, dtype=int)).any()
     mirrored = [
         BSplineVolume(one.degrees, one.knots, one.control_points * [-1.0, 1.0, 1.0]) for one in around_a_line(4)
     ]
-    for interface in Body(tuple(mirrored), around_a_line(4).interfaces).interfaces:
-        assert not on_one_side(interface, [-1] * 4)
+    body = Body(tuple(mirrored), around_a_line(4).interfaces)
+    assert not on_one_side(body.interface_rows, -np.ones(4, dtype=int)).any()

@@ -5,14 +5,18 @@ point but those of lines where many patches meet. That it is one-to-one there, a
 boundary (boundary.py), by the theorem in docs/certificate.md.
 """
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
 
 from ..arrays import IntArray, in_brackets
 from ..display import Shown
-from ..spline.body import BodyLike, as_body
+from ..spline.body import Body, BodyLike, as_body
 from ..spline.interface import Interface
 from .gluing import on_one_side
-from .jacobian import Parameters, PatchCertificate, Verdict, certify_patch
+from .jacobian import Parameters, PatchCertificate, Verdict, certify_patches
 
 
 @dataclass(frozen=True)
@@ -159,12 +163,17 @@ def certify(body: BodyLike, *, max_depth: int = 6) -> Certificate:
     glued = as_body(body)
     if max_depth < 0:
         raise ValueError(f"max_depth must be non-negative, got {max_depth}")
-    patches = tuple(certify_patch(patch, max_depth) for patch in glued)
-    signs = [-1 if patch.left_handed else 1 for patch in patches]
-    proved = [patch.verdict == "certified" for patch in patches]
-    misglued = (
-        interface
-        for interface in glued.interfaces
-        if proved[interface.first[0]] and proved[interface.second[0]] and on_one_side(interface, signs)
-    )
-    return Certificate(patches, tuple(misglued))
+    patches: list[Any] = [None] * len(glued)
+    for group in glued.groups:
+        for number, certificate in zip(group.numbers, certify_patches(glued.patches, group, max_depth), strict=True):
+            patches[number] = certificate
+    return Certificate(tuple(patches), tuple(_misglued(glued, patches)))
+
+
+def _misglued(body: Body, patches: Sequence[PatchCertificate]) -> Iterator[Interface]:
+    """Yield the interfaces whose two patches, certified, lie on the same side."""
+    signs = np.array([-1 if patch.left_handed else 1 for patch in patches])
+    proved = np.array([patch.verdict == "certified" for patch in patches])
+    rows = body.interface_rows
+    wrong = proved[rows[:, [0, 2]]].all(axis=1) & on_one_side(rows, signs)
+    return (body.interfaces[number] for number in np.flatnonzero(wrong))

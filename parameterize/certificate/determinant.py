@@ -1,4 +1,4 @@
-"""det J of a trivariate spline in Bernstein form on any of its spans, with a bound of the rounding errors.
+"""det J of trivariate splines in Bernstein form on any of their spans, with a bound of the rounding errors.
 
 The control points of the three derivatives are brought to Bernstein form, and their triple product is formed with the
 product rule for Bernstein polynomials: of degree 3 p - 1 a direction. No interpolation, so that errors stay small.
@@ -10,7 +10,7 @@ import numpy as np
 from ..arrays import Array, IntArray
 from ..spline.bernstein import add_products, binomials, cross_products, extraction
 from ..spline.bspline import breakpoints
-from ..spline.volume import BSplineVolume
+from ..spline.patch_groups import PatchGroup
 from ..threads import in_parallel
 
 CHUNK = 64  # spans at a time: their data fit into the cache
@@ -21,48 +21,58 @@ _NO_EXPONENT = -10_000  # stands for an entry of J that is zero everywhere: belo
 
 
 class DeterminantForm:
-    """det J of a volume, ready to be written in Bernstein form on any of its spans.
+    """det J of the patches of a group, ready to be written in Bernstein form on any of their spans.
 
-    The rows and the columns of J are scaled by powers of two to magnitude 1: true det J = 2**exponent * computed.
+    The rows and the columns of J are scaled by powers of two to magnitude 1: true det J = 2**exponent * computed, with
+    an exponent for each patch.
     """
 
-    def __init__(self, volume: BSplineVolume) -> None:
-        self.degrees = volume.degrees
-        self.breaks = [breakpoints(k) for k in volume.knots]
+    def __init__(self, group: PatchGroup) -> None:
+        self.degrees = group.degrees
+        self.breaks = [breakpoints(k) for k in group.knots]
         self.n_spans: tuple[int, ...] = tuple(len(b) - 1 for b in self.breaks)
         self.span_count = int(np.prod(self.n_spans))
-        self.roundings = _roundings(volume.degrees)
-        points = np.moveaxis(volume.control_points, -1, 0)
-        derivatives = [_differences(points, volume.knots[b], volume.degrees[b], b) for b in range(3)]
-        self.nets, self.exponent = _to_unit_magnitude(derivatives)  # for each derivative: (3, N_0, N_1, N_2)
+        self.patch_count = len(group)
+        self.roundings = _roundings(group.degrees)
+        points = np.moveaxis(group.control_points, -1, 1)
+        derivatives = [_differences(points, group.knots[b], group.degrees[b], b) for b in range(3)]
+        self.nets, self.exponents = _to_unit_magnitude(derivatives)  # for each derivative: (patches, 3, N_0, N_1, N_2)
         self.bases = [  # for each derivative and direction: first, weights
-            [scaled_extraction(volume.knots[a], volume.degrees[a], a == b) for a in range(3)] for b in range(3)
+            [scaled_extraction(group.knots[a], group.degrees[a], a == b) for a in range(3)] for b in range(3)
         ]
         self.counts: tuple[int, ...] = tuple(3 * p for p in self.degrees)
         self.unscale = unscaling(self.counts)
 
     def numbers(self, flat: IntArray) -> IntArray:
-        """Return flat span numbers (k,) as rows (i, j, l): (k, 3)."""
-        return np.stack(np.unravel_index(flat, self.n_spans), axis=-1).astype(np.int64)
+        """Return flat numbers (k,) of the spans of all patches, patch after patch, as rows (patch, i, j, l): (k, 4)."""
+        return np.stack(np.unravel_index(flat, (self.patch_count, *self.n_spans)), axis=-1).astype(np.int64)
 
     def span_sizes(self) -> Array:
-        """Return the parametric volume of every span, (n_spans in all,)."""
+        """Return the parametric volume of every span of a patch, (spans,)."""
         return np.asarray(np.einsum("i,j,k->ijk", *(np.diff(b) for b in self.breaks)).ravel())
 
     def survey(self) -> tuple[Array, Array, Array]:
-        """Return for all spans: lower bound of det J, least value at the 8 corners, mean; (n_spans in all,) each."""
+        """Return lower bounds of det J and of -det J, the least values of both at the 8 corners, and means of det J.
+
+        For all spans of all patches: (2, patches, spans), (2, patches, spans) and (patches, spans).
+        """
 
         def part(chunk: IntArray) -> tuple[Array, Array, Array]:
             values, permanents = self.coefficients(self.numbers(chunk))
-            bounds = values.min(axis=(0, 1, 2)) - self.errors(permanents)
-            return bounds, corners_of(values).min(axis=(0, 1, 2)), values.mean(axis=(0, 1, 2))
+            return (
+                _least_of_both(values) - self.errors(permanents),
+                _least_of_both(corners_of(values)),
+                values.mean(axis=(0, 1, 2)),
+            )
 
-        chunks = [np.arange(i, min(i + CHUNK, self.span_count)) for i in range(0, self.span_count, CHUNK)]
-        bounds, corners, means = map(np.concatenate, zip(*in_parallel(part, chunks), strict=True))
+        count = self.patch_count * self.span_count
+        chunks = [np.arange(i, min(i + CHUNK, count)) for i in range(0, count, CHUNK)]
+        rows = (np.concatenate(parts, axis=-1) for parts in zip(*in_parallel(part, chunks), strict=True))
+        bounds, corners, means = (row.reshape(*row.shape[:-1], self.patch_count, self.span_count) for row in rows)
         return bounds, corners, means
 
     def coefficients(self, spans: IntArray) -> tuple[Array, Array]:
-        """Return Bernstein coefficients on spans (k, 3), (d_u, d_v, d_w, k), and permanents (k,) that bound them."""
+        """Return Bernstein coefficients on spans (k, 4), (d_u, d_v, d_w, k), and permanents (k,) that bound them."""
         local, sizes = zip(*(self._derivative(b, spans) for b in range(3)), strict=True)
         f_u, f_v, f_w = local  # (3, n_0, n_1, n_2, k) each, scaled Bernstein form
         cross = cross_products(f_v, f_w)
@@ -82,31 +92,31 @@ class DeterminantForm:
         return 1.01 * relative / (1.0 - relative) * permanents + _UNDERFLOW  # one percent: the bound itself is rounded
 
     def _derivative(self, b: int, spans: IntArray) -> tuple[Array, Array]:
-        """Return the b-th derivative on spans (k, 3): scaled Bernstein form (3, n_0, n_1, n_2, k), sizes (3, k)."""
+        """Return the b-th derivative on spans (k, 4): scaled Bernstein form (3, n_0, n_1, n_2, k), sizes (3, k)."""
         net = self._near(self.nets[b], b, spans)
         magnitudes, shape = np.abs(net).max(axis=(1, 2, 3)), net.shape
-        for axis, ((_, weights), number) in enumerate(zip(self.bases[b], spans.T, strict=True)):
+        for axis, ((_, weights), number) in enumerate(zip(self.bases[b], spans.T[1:], strict=True)):
             matrices = np.ascontiguousarray(np.moveaxis(weights[number], 0, -1))
             net = _times(matrices, net.reshape(int(np.prod(shape[: 1 + axis])), len(matrices), -1, len(spans)))
         return net.reshape(shape), magnitudes
 
     def _near(self, net: Array, b: int, spans: IntArray) -> Array:
-        """Return those of the b-th derivative's control points (c, ...) that spans (k, 3) need: (c, ..., k)."""
-        first = np.stack([start[number] for (start, _), number in zip(self.bases[b], spans.T, strict=True)])  # (3, k)
-        return _windows(net, first, tuple(weights.shape[1] for _, weights in self.bases[b]))
+        """Return those of the b-th derivative's control points (patches, c, ..) that spans (k, 4) need: (c, .., k)."""
+        first = np.stack([start[number] for (start, _), number in zip(self.bases[b], spans.T[1:], strict=True)])
+        return _windows(net, spans[:, 0], first, tuple(weights.shape[1] for _, weights in self.bases[b]))
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def _windows(net: Array, first: IntArray, sizes: tuple[int, int, int]) -> Array:
-    """Return the control points of (c, N_0, N_1, N_2) from each of the first ones (3, k) on: (c, *sizes, k)."""
-    found = np.empty((net.shape[0], sizes[0], sizes[1], sizes[2], first.shape[1]))
-    for c in range(net.shape[0]):
+def _windows(net: Array, patches: IntArray, first: IntArray, sizes: tuple[int, int, int]) -> Array:
+    """Return the control points of patches (k,) in (patches, c, N_0, N_1, N_2) from first (3, k) on: (c, *sizes, k)."""
+    found = np.empty((net.shape[1], sizes[0], sizes[1], sizes[2], first.shape[1]))
+    for c in range(net.shape[1]):
         for i in range(sizes[0]):
             for j in range(sizes[1]):
                 for m in range(sizes[2]):
                     row = found[c, i, j, m]
                     for k in range(row.size):
-                        row[k] = net[c, first[0, k] + i, first[1, k] + j, first[2, k] + m]
+                        row[k] = net[patches[k], c, first[0, k] + i, first[1, k] + j, first[2, k] + m]
     return found
 
 
@@ -125,6 +135,11 @@ def _times(matrices: Array, field: Array) -> Array:
     return applied
 
 
+def _least_of_both(values: Array) -> Array:
+    """Return the least of values (.., .., .., k) and of their negatives: (2, k)."""
+    return np.stack([values.min(axis=(0, 1, 2)), -values.max(axis=(0, 1, 2))])
+
+
 def corners_of(values: Array, first: int = 0) -> Array:
     """Return the coefficients at the eight corners of the three axes from `first` on: (..., 2, 2, 2, ...)."""
     steps = (slice(None, None, n - 1) for n in values.shape[first : first + 3])
@@ -132,35 +147,35 @@ def corners_of(values: Array, first: int = 0) -> Array:
 
 
 def _differences(points: Array, knots: Array, degree: int, axis: int) -> tuple[Array, IntArray]:
-    """Return control points (3, ...) of the derivative along an axis (The NURBS Book, eq. 3.7): m, e of m * 2**e.
+    """Return control points (patches, 3, ..) of the derivative along an axis as m and e of m * 2**e.
 
-    Every m is 0 or in [1/4, 1), so that no product underflows.
+    They follow from The NURBS Book, eq. 3.7. Every m is 0 or in [1/4, 1), so that no product underflows.
     """
-    n = points.shape[axis + 1]
+    n = points.shape[axis + 2]
     width = knots[degree + 1 : degree + n] - knots[1:n]
     with np.errstate(over="ignore"):
         factor = degree / width
     if not np.all(np.isfinite(factor)):
         raise ValueError("the derivatives of the volume overflow; widen its knot spans")
-    shape = [1, 1, 1, 1]
-    shape[axis + 1] = n - 1
-    mantissas, exponents = np.frexp(np.diff(points, axis=axis + 1))
+    shape = [1, 1, 1, 1, 1]
+    shape[axis + 2] = n - 1
+    mantissas, exponents = np.frexp(np.diff(points, axis=axis + 2))
     factor_mantissas, factor_exponents = np.frexp(factor.reshape(shape))
     return mantissas * factor_mantissas, exponents.astype(np.int64) + factor_exponents
 
 
-def _to_unit_magnitude(derivatives: list[tuple[Array, IntArray]]) -> tuple[list[Array], int]:
-    """Return the three derivatives' control points m * 2**e / 2**(r_a + c_b), and the sum of all r_a and c_b.
+def _to_unit_magnitude(derivatives: list[tuple[Array, IntArray]]) -> tuple[list[Array], IntArray]:
+    """Return the three derivatives' control points m * 2**e / 2**(r_a + c_b), and each patch's sum of all r_a and c_b.
 
     r_a belongs to a component and c_b to a derivative. All magnitudes are below 1, and in each row and each column of J
     some reach 1/4. This is the only rounding: a number below 2**-1022 is then off by at most 2**-1075.
     """
-    largest = np.array([[np.where(m[a] != 0.0, e[a], _NO_EXPONENT).max() for m, e in derivatives] for a in range(3)])
-    rows = largest.max(axis=1)
-    columns = (largest - rows[:, None]).max(axis=0)
-    scaled = zip(derivatives, columns, strict=True)
-    nets = [np.ldexp(m, e - rows[:, None, None, None] - column) for (m, e), column in scaled]
-    return nets, int(rows.sum() + columns.sum())
+    largest = np.stack([np.where(m != 0.0, e, _NO_EXPONENT).max(axis=(2, 3, 4)) for m, e in derivatives], axis=2)
+    rows = largest.max(axis=2)  # (patches, 3)
+    columns = (largest - rows[:, :, None]).max(axis=1)
+    shifts = rows[:, :, None] + columns[:, None]  # (patches, component, derivative)
+    nets = [np.ldexp(m, e - shifts[:, :, b, None, None, None]) for b, (m, e) in enumerate(derivatives)]
+    return nets, rows.sum(axis=1) + columns.sum(axis=1)
 
 
 def unscaling(counts: tuple[int, ...]) -> Array:

@@ -1,15 +1,16 @@
 """How patches lie beside each other: points that interfaces make one, and patches on opposite sides of an interface."""
 
-from collections.abc import Sequence
-
 import numpy as np
 
-from ..arrays import IntArray
+from ..arrays import IntArray, Mask
 from ..cube.cube import VARYING_AXES
 from ..spline.body import Body, shared_numbers
 from ..spline.bspline import breakpoints
-from ..spline.interface import Face, Interface, axis_side
+from ..spline.interface import axis_side
+from ..spline.volume import FACE_NAMES
 
+# Whether the outward direction of each face, then the two along it are right-handed in the cube: 1, else -1.
+_OUTWARD = np.array([(1 if side else -1) * (-1 if axis == 1 else 1) for axis, side in map(axis_side, FACE_NAMES)])
 _PLACES = [0, 1, 3]  # of the four lattice points a direction: the lower end, between the ends, the upper end
 
 
@@ -27,7 +28,9 @@ class SharedPoints:
         ahead, *further = (labels[:, rows[0]][:, :, rows[1]][..., rows[2]] for rows in ([_PLACES] * 3, *ways))
         self._numbers = np.minimum.reduce([ahead, *further])  # (patches, 3, 3, 3)
         self._backward = np.stack([other < ahead for other in further], axis=-1)  # (patches, 3, 3, 3, 3)
-        self._spans = np.array([[len(breakpoints(row)) - 1 for row in patch.knots] for patch in body])
+        self._spans: IntArray = np.empty((len(body), 3), dtype=np.int64)
+        for group in body.groups:
+            self._spans[group.numbers] = [len(breakpoints(row)) - 1 for row in group.knots]
 
     def names(self, patches: IntArray, axes: IntArray, positions: IntArray, steps: int) -> IntArray:
         """Return the names (n, m, 3) of points of outer faces; different points have different ones.
@@ -44,18 +47,11 @@ class SharedPoints:
         return np.stack([self._numbers[rows], first + second, second * on_face], axis=-1)
 
 
-def on_one_side(interface: Interface, signs: Sequence[int]) -> bool:
-    """Return whether the two patches of an interface lie on the same side of it: one is folded back over the other.
+def on_one_side(rows: IntArray, signs: IntArray) -> Mask:
+    """Return whether the two patches of interfaces lie on the same side, (k,): one is folded back over the other.
 
-    signs: of det J of each patch, 1 or -1, which must be that of every point of its face. Both outward directions are
-    compared with one normal of the common surface.
+    rows: (k, 7), see interface_rows.py. signs: of det J of each patch, 1 or -1, which must be that of every point of
+    its face. Both outward directions are compared with one normal of the common surface.
     """
-    reversals = interface.swapped + sum(interface.flipped)
-    first, second = (signs[face[0]] * _outward(face) for face in (interface.first, interface.second))
-    return first == second * (-1) ** reversals
-
-
-def _outward(face: Face) -> int:
-    """Return whether the outward direction, then the two along a face are right-handed in the cube: 1, else -1."""
-    axis, side = axis_side(face[1])
-    return (1 if side else -1) * (-1 if axis == 1 else 1)
+    first, second = (signs[rows[:, side]] * _OUTWARD[rows[:, side + 1]] for side in (0, 2))
+    return np.asarray(first == second * (-1) ** rows[:, 4:].sum(axis=1))

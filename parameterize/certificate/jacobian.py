@@ -1,6 +1,6 @@
 """PatchCertificate: a proof that det J of a spline is positive on the whole cube, or a point where it is not.
 
-For a left-handed volume, whose det J is negative on the whole, the mirror image is examined: -det J > 0.
+For a left-handed volume, whose det J is negative on the whole, -det J > 0 is examined.
 
 The Bernstein coefficients of det J bound it on every span, those at its corners are values (docs/method.md, section 6;
 Johnen, Remacle, Geuzaine, "Geometrical validity of curvilinear finite elements", J. Comput. Phys. 233, 2013, section
@@ -8,14 +8,15 @@ Johnen, Remacle, Geuzaine, "Geometrical validity of curvilinear finite elements"
 "negative" mean by more than a bound of all rounding errors (determinant.py).
 """
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 
 from ..arrays import Array, IntArray, Mask
 from ..spline.bernstein import split
-from ..spline.orientation import mirrored, orientation
+from ..spline.patch_groups import PatchGroup
 from ..spline.volume import BSplineVolume
 from .determinant import CHUNK, DeterminantForm, corners_of
 from .rational_determinant import RationalDeterminantForm
@@ -24,6 +25,8 @@ Verdict = Literal["certified", "folded", "undecided"]
 Parameters = tuple[float, float, float]  # of a point of the cube
 CLAIMS = {"right-handed": "det J > 0", "left-handed": "det J < 0"}
 
+_NONE: IntArray = np.empty((0, 3), dtype=np.int64)
+_PATCHES = 4096  # patches at a time: a bound of the memory
 _PIECES = 64  # pieces at a time
 _TIGHT = 0.5  # a proved bound below this share of the least known value of det J is refined
 
@@ -79,34 +82,58 @@ class PatchCertificate:
         return CLAIMS[self.orientation]
 
 
-def certify_patch(volume: BSplineVolume, max_depth: int) -> PatchCertificate:
-    """Decide whether det J has one sign on the whole cube, cutting doubtful spans at most `max_depth` times in eight.
+def certify_patches(patches: Sequence[BSplineVolume], group: PatchGroup, max_depth: int) -> list[PatchCertificate]:
+    """Decide whether det J has one sign on the whole cube of each patch of a group, in its order.
 
+    patches: of the body that the group belongs to. Doubtful spans are cut in eight, at most `max_depth` times.
     Raises ValueError where derivatives overflow.
     """
-    left_handed = orientation(volume) < 0
-    if left_handed:
-        volume = mirrored(volume)
-    form = DeterminantForm(volume) if volume.weights is None else RationalDeterminantForm(volume)
-    bounds, corners, means = form.survey()
-    search = _Search(form, max_depth, float(corners.min()))
-    doubtful = np.flatnonzero(~(bounds > search.target))  # span numbers, flat
-    for begin in range(0, len(doubtful), CHUNK):
-        search.examine(doubtful[begin : begin + CHUNK])
-    bounds[doubtful] = np.inf
-    lowest = min(float(bounds.min()), search.lowest)
-    mean = float(np.sum(means * form.span_sizes()))
-    failed = np.flatnonzero(search.unproved)
-    verdict: Verdict = "undecided" if failed.size else "certified"
+    found = []
+    for part in group.divided(_PATCHES):
+        found += _certified(part, [patches[number] for number in part.numbers], max_depth)
+    return found
+
+
+def _certified(group: PatchGroup, patches: Sequence[BSplineVolume], max_depth: int) -> list[PatchCertificate]:
+    """Return the certificates of the patches of a group, (k,) as given."""
+    form = DeterminantForm(group) if group.weights is None else RationalDeterminantForm(group)
+    both_bounds, both_corners, means = form.survey()
+    mean = (means * form.span_sizes()).sum(axis=1)
+    left = mean < 0.0
+    side, rows = left.astype(np.int64), np.arange(len(group))
+    bounds, known = both_bounds[side, rows], both_corners[side, rows].min(axis=1)
+    size = np.ldexp(mean, form.exponents)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        lowest = bounds.min(axis=1) / np.abs(mean)
+    columns = zip(lowest.tolist(), size.tolist(), left.tolist(), strict=True)
+    found = [PatchCertificate("certified", low, volume, None, _NONE, turned) for low, volume, turned in columns]
+    doubtful = ~(bounds > np.maximum(0.0, _TIGHT * known)[:, None])
+    for row in np.flatnonzero(doubtful.any(axis=1)).tolist():
+        search = _Search(form, row, float(mean[row]), max_depth, float(known[row]))
+        found[row] = _searched(search, patches[row], bounds[row], doubtful[row], found[row])
+    return found
+
+
+def _searched(
+    search: "_Search", volume: BSplineVolume, bounds: Array, doubtful: Mask, at_first: PatchCertificate
+) -> PatchCertificate:
+    """Return the certificate of a patch with doubtful spans (spans,), each examined by a search.
+
+    bounds: (spans,) lower bounds of the whole spans. at_first: what these alone say.
+    """
+    numbers = np.flatnonzero(doubtful)
+    for begin in range(0, len(numbers), CHUNK):
+        search.examine(numbers[begin : begin + CHUNK])
+    lowest = min(float(bounds[~doubtful].min(initial=np.inf)), search.lowest)
+    verdict: Verdict = "undecided" if search.unproved.any() else "certified"
     if search.worst_piece is not None:
         verdict = "folded"
-    return PatchCertificate(
+    return replace(
+        at_first,
         verdict=verdict,
-        lower_bound=lowest / abs(mean) if mean != 0.0 else -np.inf,
-        mean_det=float(np.ldexp(-mean if left_handed else mean, form.exponent)),
+        lower_bound=lowest / abs(search.mean) if search.mean != 0.0 else -np.inf,
         witness=search.witness(volume),
-        unproved=form.numbers(failed),
-        left_handed=left_handed,
+        unproved=search.rows(np.flatnonzero(search.unproved))[:, 1:],
         flat=search.parameters(search.flat_piece) if search.flat_piece and verdict == "undecided" else None,
     )
 
@@ -148,8 +175,11 @@ class _Search:
     takes.
     """
 
-    def __init__(self, form: DeterminantForm, max_depth: int, known: float) -> None:
+    def __init__(self, form: DeterminantForm, patch: int, mean: float, max_depth: int, known: float) -> None:
         self.form = form
+        self.patch = patch  # its place in the form's group
+        self.mean = mean  # of det J over the patch
+        self.sign = -1.0 if mean < 0.0 else 1.0  # of a left-handed patch -det J takes the place of det J
         self.max_depth = max_depth
         self.known = known  # least value of det J seen
         self.lowest = np.inf  # least bound of det J over the finished pieces
@@ -161,8 +191,8 @@ class _Search:
 
     def examine(self, spans: IntArray) -> None:
         """Examine whole spans (k,), flat numbers, until each is proved, folded or given up."""
-        values, permanents = self.form.coefficients(self.form.numbers(spans))
-        whole = np.ascontiguousarray(np.moveaxis(values, -1, 0))
+        values, permanents = self.form.coefficients(self.rows(spans))
+        whole = self.sign * np.ascontiguousarray(np.moveaxis(values, -1, 0))
         stack = [_Pieces(0, spans, np.zeros((len(spans), 3), dtype=np.int64), whole, permanents)]
         while stack:
             top = stack.pop()
@@ -172,6 +202,10 @@ class _Search:
             doubtful = self._conclude(top)
             if len(doubtful.spans):
                 stack.append(doubtful.halved())
+
+    def rows(self, spans: IntArray) -> IntArray:
+        """Return flat numbers (k,) of spans of the patch as rows (patch, i, j, l): (k, 4)."""
+        return self.form.numbers(self.patch * self.form.span_count + spans)
 
     @property
     def target(self) -> float:
@@ -208,7 +242,7 @@ class _Search:
     def parameters(self, corner: _Corner, inward: float = 0.0) -> Parameters:
         """Return the parameters of a corner of a piece, or of a point a share of the way towards its middle."""
         depth, span, origin, place = corner
-        number = self.form.numbers(np.array([span]))[0]
+        number = self.rows(np.array([span]))[0, 1:]
         edges = np.array([b[[i, i + 1]] for b, i in zip(self.form.breaks, number, strict=True)])  # (3, 2)
         local = (origin + place + inward * (0.5 - place)) / 2.0**depth
         u, v, w = ((1.0 - local) * edges[:, 0] + local * edges[:, 1]).tolist()
@@ -224,7 +258,7 @@ class _Search:
             return None
         for inward in (0.0, 1e-12, 1e-9, 1e-6, 1e-3):
             point = self.parameters(self.worst_piece, inward)
-            if np.linalg.det(volume.jacobian(point)[0]) <= 0.0:
+            if self.sign * np.linalg.det(volume.jacobian(point)[0]) <= 0.0:
                 break
         return point
 

@@ -1,4 +1,4 @@
-"""det J of a rational volume F = A / W times W^4, in Bernstein form, with a bound of the rounding errors.
+"""det J of rational patches F = A / W times W^4, in Bernstein form, with a bound of the rounding errors.
 
 With the homogeneous components H = (A, W), W^4 det J is the determinant with the columns H_u, H_v, H_w and H, up to its
 sign: subtracting F_W columns leaves W F_u, W F_v and W F_w in the first three rows, and W alone in the last. It is a
@@ -14,48 +14,46 @@ import numpy as np
 from ..arrays import Array, IntArray
 from ..spline.bernstein import add_products
 from ..spline.bspline import breakpoints
-from ..spline.orientation import enclosed_volume
-from ..spline.rational import homogeneous
-from ..spline.volume import BSplineVolume
+from ..spline.orientation import enclosed_volumes
+from ..spline.patch_groups import PatchGroup
 from .determinant import DeterminantForm, scaled_extraction, unscaling
 
 _PAIRS = tuple(combinations(range(4), 2))
 
 
 class RationalDeterminantForm(DeterminantForm):
-    """W^4 det J of a rational volume, in place of det J; 2**exponent is the factor of both.
+    """W^4 det J of the patches of a rational group, in place of det J; 2**exponent is the factor of both.
 
     nets, bases: of H_u, H_v, H_w and H. largest: sums of the magnitudes whose differences the control points are.
     """
 
-    def __init__(self, volume: BSplineVolume) -> None:
-        self.degrees = volume.degrees
-        self.breaks = [breakpoints(k) for k in volume.knots]
+    def __init__(self, group: PatchGroup) -> None:
+        self.degrees = group.degrees
+        self.breaks = [breakpoints(k) for k in group.knots]
         self.n_spans = tuple(len(b) - 1 for b in self.breaks)
         self.span_count = int(np.prod(self.n_spans))
+        self.patch_count = len(group)
         self.counts = tuple(4 * p for p in self.degrees)
         self.unscale = unscaling(self.counts)
-        self.roundings = _roundings(volume.degrees)
-        local, power = _at_unit_scale(volume)
-        weights = np.asarray(volume.weights)
-        net = np.moveaxis(homogeneous(local.control_points, weights / weights.max()), -1, 0)
-        columns = [_differences(net, volume, b) for b in range(3)]
-        powers = [int(np.frexp(largest.max())[1]) for _, largest in columns]
-        self.nets = [*(np.ldexp(part, -e) for (part, _), e in zip(columns, powers, strict=True)), net]
-        self.largest = [*(np.ldexp(part, -e) for (_, part), e in zip(columns, powers, strict=True)), np.abs(net)]
-        self.exponent = 3 * power + sum(powers)
-        self.bases = [
-            [scaled_extraction(volume.knots[a], volume.degrees[a], a == b) for a in range(3)] for b in range(4)
-        ]
-        self.mean = float(np.ldexp(enclosed_volume(local, np.zeros(3)), -sum(powers)))
+        self.roundings = _roundings(group.degrees)
+        local, powers = _at_unit_scale(group)
+        net = np.moveaxis(local.coefficients, -1, 1)
+        columns = [_differences(net, group, b) for b in range(3)]
+        of_columns = [np.frexp(largest.max(axis=(1, 2, 3, 4)))[1].astype(np.int64) for _, largest in columns]
+        shifts = [-exponents[:, None, None, None, None] for exponents in of_columns]
+        self.nets = [*(np.ldexp(part, e) for (part, _), e in zip(columns, shifts, strict=True)), net]
+        self.largest = [*(np.ldexp(part, e) for (_, part), e in zip(columns, shifts, strict=True)), np.abs(net)]
+        self.exponents = 3 * powers + sum(of_columns)
+        self.bases = [[scaled_extraction(group.knots[a], group.degrees[a], a == b) for a in range(3)] for b in range(4)]
+        self.means = np.ldexp(enclosed_volumes(local, np.zeros(3)), -sum(of_columns))
 
     def survey(self) -> tuple[Array, Array, Array]:
-        """Return as for a polynomial volume, of W^4 det J; the mean of det J over the cube stands for that of spans."""
+        """Return as for polynomial patches, of W^4 det J; the mean of det J over the cube stands for that of spans."""
         bounds, corners, means = super().survey()
-        return bounds, corners, np.full_like(means, self.mean)
+        return bounds, corners, np.broadcast_to(self.means[:, None], means.shape)
 
     def coefficients(self, spans: IntArray) -> tuple[Array, Array]:
-        """Return Bernstein coefficients on spans (k, 3), (d_u, d_v, d_w, k), and permanents (k,) that bound them."""
+        """Return Bernstein coefficients on spans (k, 4), (d_u, d_v, d_w, k), and permanents (k,) that bound them."""
         f_u, f_v, f_w, h = (self._derivative(b, spans)[0] for b in range(4))
         sizes = np.stack([self._near(self.largest[b], b, spans).max(axis=(1, 2, 3)) for b in range(4)])  # (4, 4, k)
         determinant = np.zeros((*self.counts, len(spans)))
@@ -66,23 +64,28 @@ class RationalDeterminantForm(DeterminantForm):
         return determinant * self.unscale, np.sum(terms, axis=0)
 
 
-def _at_unit_scale(volume: BSplineVolume) -> tuple[BSplineVolume, int]:
-    """Return the volume about the origin, its coordinates below 1, and e: the volume is 2**e times as large."""
-    points = volume.control_points
-    moved = points - (points.min(axis=(0, 1, 2)) + points.max(axis=(0, 1, 2))) / 2.0
-    power = int(np.frexp(np.abs(moved).max())[1])
-    return replace(volume, control_points=np.ldexp(moved, -power)), power
+def _at_unit_scale(group: PatchGroup) -> tuple[PatchGroup, IntArray]:
+    """Return patches about the origin, their coordinates below 1, their largest weight 1, and the exponents (k,) of 2.
+
+    The given patches are 2**exponent as large.
+    """
+    points, weights = group.control_points, np.asarray(group.weights)
+    middles = (points.min(axis=(1, 2, 3)) + points.max(axis=(1, 2, 3))) / 2.0
+    moved = points - middles[:, None, None, None]
+    powers = np.frexp(np.abs(moved).max(axis=(1, 2, 3, 4)))[1].astype(np.int64)
+    near = np.ldexp(moved, -powers[:, None, None, None, None])
+    return replace(group, control_points=near, weights=weights / weights.max(axis=(1, 2, 3), keepdims=True)), powers
 
 
-def _differences(net: Array, volume: BSplineVolume, axis: int) -> tuple[Array, Array]:
-    """Return control points (4, ...) of the derivative of H (4, ...) along an axis, and what bounds their terms."""
-    knots, degree, n = volume.knots[axis], volume.degrees[axis], net.shape[axis + 1]
+def _differences(net: Array, group: PatchGroup, axis: int) -> tuple[Array, Array]:
+    """Return control points (k, 4, ...) of the derivative of H (k, 4, ...) along an axis, and bounds of their terms."""
+    knots, degree, n = group.knots[axis], group.degrees[axis], net.shape[axis + 2]
     with np.errstate(over="ignore"):
         factor = degree / (knots[degree + 1 : degree + n] - knots[1:n])
     if not np.all(np.isfinite(factor)):
         raise ValueError("the derivatives of the volume overflow; widen its knot spans")
-    factor = factor.reshape([-1 if a == axis + 1 else 1 for a in range(4)])
-    ahead, behind = (np.take(net, range(first, first + n - 1), axis=axis + 1) for first in (1, 0))
+    factor = factor.reshape([-1 if a == axis + 2 else 1 for a in range(5)])
+    ahead, behind = (np.take(net, range(first, first + n - 1), axis=axis + 2) for first in (1, 0))
     return factor * (ahead - behind), factor * (np.abs(ahead) + np.abs(behind))
 
 

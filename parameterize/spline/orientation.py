@@ -11,28 +11,31 @@ from math import ceil, log2
 
 import numpy as np
 
-from ..arrays import Array
+from ..arrays import Array, IntArray
 from .bspline import gauss_points
+from .patch_groups import PatchGroup, group_of
 from .volume import BSplineVolume
 
 FACES = tuple(product(range(3), (0, 1)))  # axis and side
 RATIONAL_POINTS = 12  # measured on arcs of 90, 120 and 180 degrees
 
 
-def face_vectors(volume: BSplineVolume, rows: Sequence[Array], axis: int, side: int) -> tuple[Array, Array]:
-    """Return points on a face, and normals as long as the surface element: (3, q_b, q_c) each.
+def face_vectors(
+    volume: BSplineVolume | PatchGroup, rows: Sequence[Array], axis: int, side: int
+) -> tuple[Array, Array]:
+    """Return points on a face, and normals as long as the surface element: (3, q_b, q_c) each; (3, k, ..) of a group.
 
     rows: the three rows of parameters of a tensor grid in the cube; the row of `axis` is not read. The normals point
     outward on a right-handed volume, inward on a left-handed one.
     """
     u, v, w = (np.array([float(side)]) if a == axis else row for a, row in enumerate(rows))
-    points = np.moveaxis(np.squeeze(volume.grid(u, v, w), axis), -1, 0)
-    jacobian = np.squeeze(volume.grid_jacobian(u, v, w), axis)  # (q_b, q_c, 3, 3)
+    points = np.moveaxis(np.squeeze(volume.grid(u, v, w), axis - 4), -1, 0)
+    jacobian = np.squeeze(volume.grid_jacobian(u, v, w), axis - 5)  # (.., q_b, q_c, 3, 3)
     area = np.moveaxis(np.cross(jacobian[..., (axis + 1) % 3], jacobian[..., (axis + 2) % 3]), -1, 0)
     return points, area if side else -area
 
 
-def exact_points(volume: BSplineVolume, parts: Sequence[int] = (1, 1, 1)) -> list[int]:
+def exact_points(volume: BSplineVolume | PatchGroup, parts: Sequence[int] = (1, 1, 1)) -> list[int]:
     """Return the numbers of Gauss points a direction for which integrals of det J and over faces are exact.
 
     They are exact for products of three splines, two of them differentiated. A rational volume has RATIONAL_POINTS
@@ -51,28 +54,33 @@ def enclosed_volume(volume: BSplineVolume, middle: Array) -> float:
     It is exact up to rounding, of a rational volume as far as `exact_points` says. middle: a point (3,) near the body,
     about which the integrals are taken.
     """
-    rules = exact_rules(volume)
-    total = 0.0
+    return float(enclosed_volumes(group_of(volume), middle)[0])
+
+
+def enclosed_volumes(group: PatchGroup, middles: Array) -> Array:
+    """Return what `enclosed_volume` does, of all patches of a group (k,); middles: (3,) or (k, 3)."""
+    rules = exact_rules(group)
+    total = np.zeros(len(group))
     for axis, side in FACES:
-        total += face_flux(volume, rules, axis, side, middle)
+        total += face_flux(group, rules, axis, side, middles)
     return total
 
 
-def exact_rules(volume: BSplineVolume) -> list[tuple[Array, Array]]:
+def exact_rules(volume: BSplineVolume | PatchGroup) -> list[tuple[Array, Array]]:
     """Return points and weights of each direction, with the numbers of `exact_points`."""
     return list(map(gauss_points, volume.knots, exact_points(volume)))
 
 
-def face_flux(
-    volume: BSplineVolume, rules: Sequence[tuple[Array, Array]], axis: int, side: int, middle: Array
-) -> float:
-    """Return the integral of (x - middle) . n / 3 over a face: together the six faces' are the volume.
+def face_flux(group: PatchGroup, rules: Sequence[tuple[Array, Array]], axis: int, side: int, middles: Array) -> Array:
+    """Return the integral of (x - middle) . n / 3 over a face of each patch (k,): those of six faces sum to the volume.
 
-    rules: from `exact_rules`. n points outward on a right-handed volume, inward on a left-handed one.
+    rules: from `exact_rules`. n points outward on a right-handed volume, inward on a left-handed one. middles: (3,) or
+    (k, 3).
     """
-    x, area = face_vectors(volume, [points.ravel() for points, _ in rules], axis, side)
+    x, area = face_vectors(group, [points.ravel() for points, _ in rules], axis, side)
     b, c = (rules[a][1].ravel() for a in range(3) if a != axis)
-    return float(b @ ((np.moveaxis(x, 0, -1) - middle) * np.moveaxis(area, 0, -1)).sum(axis=-1) @ c / 3.0)
+    arms = np.moveaxis(x, 0, -1) - middles[..., None, None, :]
+    return np.asarray(b @ (arms * np.moveaxis(area, 0, -1)).sum(axis=-1) @ c / 3.0)
 
 
 def orientation(volume: BSplineVolume) -> int:
@@ -80,11 +88,18 @@ def orientation(volume: BSplineVolume) -> int:
 
     Of a folded volume it is the sign of the larger part.
     """
-    points = volume.control_points.reshape(-1, 3)
-    low, high = points.min(axis=0), points.max(axis=0)
-    size = float((high - low).max()) or 1.0
+    return int(orientations(group_of(volume))[0])
+
+
+def orientations(group: PatchGroup) -> IntArray:
+    """Return the orientation of each patch of a group (k,), see `orientation`."""
+    points = group.control_points
+    low, high = points.min(axis=(1, 2, 3)), points.max(axis=(1, 2, 3))
+    size = (high - low).max(axis=1)
+    size[size == 0.0] = 1.0
     middle = (low + high) / 2.0  # size and place do not change the sign, but rounding and underflow would
-    return -1 if enclosed_volume(volume.transformed(1.0 / size, -middle / size), np.zeros(3)) < 0.0 else 1
+    near = (1.0 / size)[:, None, None, None, None] * points + (-middle / size[:, None])[:, None, None, None]
+    return np.where(enclosed_volumes(replace(group, control_points=near), np.zeros(3)) < 0.0, -1, 1)
 
 
 def mirrored(volume: BSplineVolume) -> BSplineVolume:

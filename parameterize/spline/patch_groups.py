@@ -4,13 +4,16 @@ A hexahedral mesh of thousands of patches is one group, or a few; one cube is a 
 """
 
 from collections import defaultdict
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..arrays import Array, IntArray, Knots
-from .volume import BSplineVolume
+from .bspline import evaluate_grid
+from .rational import Orders, homogeneous, quotients
+from .volume import UNITS, BSplineVolume
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,6 +46,39 @@ class PatchGroup:
 
     def __len__(self) -> int:
         return len(self.numbers)
+
+    def divided(self, most: int) -> "Iterator[PatchGroup]":
+        """Yield the group in parts of at most so many patches."""
+        for begin in range(0, len(self), most):
+            part = slice(begin, begin + most)
+            weights = None if self.weights is None else self.weights[part]
+            yield replace(self, numbers=self.numbers[part], control_points=self.control_points[part], weights=weights)
+
+    @property
+    def coefficients(self) -> Array:
+        """Return the control points (k, n_u, n_v, n_w, 3), of rational patches homogeneous, (.., 4)."""
+        return self.control_points if self.weights is None else homogeneous(self.control_points, self.weights)
+
+    def grid(self, u: ArrayLike, v: ArrayLike, w: ArrayLike, derivative: Orders = (0, 0, 0)) -> Array:
+        """Return F or one of its partial derivatives on a tensor grid: (k, len(u), len(v), len(w), 3)."""
+        return self._on_grid((u, v, w), [derivative])[0]
+
+    def grid_jacobian(self, u: ArrayLike, v: ArrayLike, w: ArrayLike) -> Array:
+        """Return the Jacobian on a tensor grid: (k, len(u), len(v), len(w), 3, 3), last index the direction."""
+        return np.stack(self._on_grid((u, v, w), UNITS), axis=-1)
+
+    def _on_grid(self, rows: Sequence[ArrayLike], orders: Sequence[Orders]) -> list[Array]:
+        net = np.moveaxis(self.coefficients, 0, 3)
+
+        def evaluate(order: Orders) -> Array:
+            return np.moveaxis(evaluate_grid(self.degrees, self.knots, net, rows, order), 3, 0)
+
+        return list(map(evaluate, orders)) if self.weights is None else quotients(evaluate, orders)
+
+
+def group_of(patch: BSplineVolume) -> PatchGroup:
+    """Return the group of one patch."""
+    return _group([patch], [0])
 
 
 def groups_of(patches: Sequence[BSplineVolume]) -> tuple[PatchGroup, ...]:
