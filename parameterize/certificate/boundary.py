@@ -15,9 +15,8 @@ import numpy as np
 
 from ..arrays import Array, IntArray, in_brackets
 from ..cube.cube import VARYING_AXES
-from ..spline.body import Body, BodyLike, as_body
+from ..spline.body import Body, BodyLike, all_control_points, as_body, parted
 from ..spline.bspline import breakpoints
-from ..spline.interface import axis_side
 from ..spline.volume import BSplineVolume
 from .patch_proofs import Pieces, as_rows, boundary_pieces, contact, halved, is_proved
 from .shells import overlap
@@ -109,13 +108,11 @@ def _local(body: Body) -> Body:
 
     Each coordinate is rounded once, relative to its difference from the middle, however far away the middle is.
     """
-    low = np.min([patch.control_points.min(axis=(0, 1, 2)) for patch in body], axis=0)
-    high = np.max([patch.control_points.max(axis=(0, 1, 2)) for patch in body], axis=0)
-    moved = [patch.control_points - (low + high) / 2.0 for patch in body]
-    exponent = int(np.frexp(max(np.abs(points).max() for points in moved))[1])
-    patches = (
-        replace(patch, control_points=np.ldexp(points, -exponent)) for patch, points in zip(body, moved, strict=True)
-    )
+    points = all_control_points(body)
+    moved = points - (points.min(axis=0) + points.max(axis=0)) / 2.0
+    exponent = int(np.frexp(np.abs(moved).max())[1])
+    nets = parted(np.ldexp(moved, -exponent), [patch.shape for patch in body])
+    patches = (replace(patch, control_points=net) for patch, net in zip(body, nets, strict=True))
     return Body(tuple(patches), body.interfaces)
 
 
@@ -131,11 +128,11 @@ def _rounding(local: Body, max_depth: int) -> float:
     vectors that bound the derivatives of a rational piece, products with weights of at most 1, are off by 10 times as
     much where a difference is off by 2: five times the bound leaves them the room that differences have.
     """
-    degree = max(max(patch.degrees) for patch in local)
+    degree = max(max(group.degrees) for group in local.groups)
     roundings = 2 * (8 * degree + 4 + max_depth * (degree + 1)) + 8 + 1
-    if any(patch.weights is not None for patch in local):
+    if any(group.weights is not None for group in local.groups):
         roundings = 5 * (2 * (roundings + 1) + 1)
-    return 1.01 * roundings * 2.0**-53 * max(float(np.abs(patch.control_points).max()) for patch in local)
+    return 1.01 * roundings * 2.0**-53 * max(float(np.abs(group.control_points).max()) for group in local.groups)
 
 
 def _meeting(body: Body, patches: IntArray, where: tuple[Array, Array]) -> Meeting:
@@ -190,10 +187,7 @@ def _slopes(body: Body, patches: list[IntArray], where: list[Array], tangents: l
 def _distance(body: Body, patches: list[IntArray], where: list[Array]) -> Array:
     """Return a lower bound (k,) of the distance of two parameters, in one patch or through glued faces; at most 1."""
     direct = np.where(patches[0] == patches[1], np.abs(where[0] - where[1]).max(axis=1), 1.0)
-    glued = np.ones((len(body), 2, 3), dtype=bool)  # faces where a parameter is 0, then those where it is 1
-    for k, names in enumerate(body.outer):
-        for axis, side in map(axis_side, names):
-            glued[k, side, axis] = False
+    glued = body.glued.reshape(len(body), 3, 2).swapaxes(1, 2)  # faces where a parameter is 0, then those where it is 1
     to_glued = (
         np.where(glued[own], np.stack([place, 1.0 - place], axis=1), 1.0).min(axis=(1, 2))
         for own, place in zip(patches, where, strict=True)

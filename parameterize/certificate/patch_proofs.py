@@ -22,9 +22,10 @@ from ..cube.cube import VARYING_AXES
 from ..spline.bernstein import elevation, extraction, halving
 from ..spline.body import Body
 from ..spline.bspline import breakpoints
-from ..spline.interface import axis_side
+from ..spline.interface import face_layer
+from ..spline.patch_groups import PatchGroup
 from ..spline.rational import projected
-from ..spline.volume import BSplineVolume
+from ..spline.volume import FACE_NAMES
 from .gluing import SharedPoints
 
 _CHUNK = 4096  # pairs at a time
@@ -72,36 +73,43 @@ class Pieces:
 
 def boundary_pieces(body: Body) -> Pieces:
     """Return all spans of the faces that are not glued, raised to the largest degree."""
-    degree = max(max(patch.degrees) for patch in body)
-    is_rational = any(patch.weights is not None for patch in body)
-    nets = [patch.homogeneous if is_rational else patch.control_points for patch in body]
-    faces = [(k, *axis_side(name)) for k, name in body.outer_faces]
-    parts = [_face_pieces(body.patches[k], nets[k], axis, side, degree) for k, axis, side in faces]
-    patches = np.repeat([k for k, _, _ in faces], [len(found) for _, _, found in parts])
-    return Pieces(0, SharedPoints(body), patches, *(np.concatenate(arrays) for arrays in zip(*parts, strict=True)))
+    degree = max(max(group.degrees) for group in body.groups)
+    components = 4 if any(group.weights is not None for group in body.groups) else 3
+    parts = [
+        _face_pieces(group, np.flatnonzero(~body.glued[group.numbers, face]), face, degree, components)
+        for group in body.groups
+        for face in range(len(FACE_NAMES))
+    ]
+    faces, low, nets = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
+    order = np.argsort(faces, kind="stable")
+    patches, face = np.divmod(faces[order], len(FACE_NAMES))
+    return Pieces(0, SharedPoints(body), patches, face // 2, low[order], nets[order])
 
 
 def _face_pieces(
-    volume: BSplineVolume, control: Array, axis: int, side: int, degree: int
+    group: PatchGroup, members: IntArray, face: int, degree: int, components: int
 ) -> tuple[IntArray, IntArray, Array]:
-    """Return constant axes (n,), low corners (n, 3) and nets (n, q + 1, q + 1, c) of one face's spans.
+    """Return numbers 6 * patch + face (n,), low corners (n, 3) and nets (n, q + 1, q + 1, c) of the spans of faces.
 
-    control: (n_u, n_v, n_w, c), control points of the volume, or homogeneous ones.
+    members: (m,) the patches of the group whose face it is. components: 4 for homogeneous control points.
     """
-    net = np.take(control, -1 if side else 0, axis=axis)  # (n_a, n_b, c)
+    axis, side = divmod(face, 2)
+    control = group.coefficients if components == 3 else group.homogeneous
+    net = face_layer(np.moveaxis(control, 0, 3), FACE_NAMES[face])[:, :, members]  # (n_a, n_b, m, c)
     a, b = VARYING_AXES[axis]
-    for direction, position in ((a, 0), (b, 2)):  # (s_a, q + 1, n_b, c), then (s_a, q + 1, s_b, q + 1, c)
-        own = volume.degrees[direction]
-        first, weights = extraction(volume.knots[direction], own)
+    for direction, position in ((a, 0), (b, 2)):  # (s_a, q + 1, n_b, m, c), then (s_a, q + 1, s_b, q + 1, m, c)
+        own = group.degrees[direction]
+        first, weights = extraction(group.knots[direction], own)
         local = np.take(net, first[:, None] + np.arange(own + 1), axis=position)
         local = np.moveaxis(local, (position, position + 1), (0, 1))
         local = np.einsum("ij,sjk,sk...->si...", elevation(own, degree), weights, local)
         net = np.moveaxis(local, (0, 1), (position, position + 1))
-    place = np.indices(net.shape[0:3:2]).reshape(2, -1).T  # (n, 2)
-    low = np.full((len(place), 3), side * (len(breakpoints(volume.knots[axis])) - 1))
+    place = np.indices(net.shape[0:3:2]).reshape(2, -1).T  # (spans, 2)
+    low = np.full((len(place), 3), side * (len(breakpoints(group.knots[axis])) - 1))
     low[:, [a, b]] = place
-    nets = net.transpose(0, 2, 1, 3, 4).reshape(-1, degree + 1, degree + 1, control.shape[3])
-    return np.full(len(place), axis), low, nets
+    nets = net.transpose(4, 0, 2, 1, 3, 5).reshape(-1, degree + 1, degree + 1, components)
+    faces = np.repeat(len(FACE_NAMES) * group.numbers[members] + face, len(place))
+    return faces, np.tile(low, (len(members), 1)), nets
 
 
 def halved(pieces: Pieces, pairs: IntArray) -> tuple[Pieces, IntArray]:

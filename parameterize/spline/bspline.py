@@ -7,6 +7,7 @@ scipy.interpolate is slow to load: it is imported where it is used.
 
 from collections import Counter
 from collections.abc import Sequence
+from functools import lru_cache
 from numbers import Integral
 
 import numba
@@ -48,6 +49,14 @@ def check_knots(knots: ArrayLike, degree: int) -> Array:
         raise ValueError(f"degree must be at least 1, got {degree}")
     if values.ndim != 1 or values.size < 2 * (degree + 1):
         raise ValueError(f"a knot vector of degree {degree} needs at least {2 * (degree + 1)} knots in one row")
+    _check_row(values.tobytes(), degree)
+    return values
+
+
+@lru_cache(maxsize=256)
+def _check_row(row: bytes, degree: int) -> None:
+    """Check the knots of `check_knots`, the same ones only once: a body may have thousands of patches with them."""
+    values = np.frombuffer(row)
     if not np.all(np.isfinite(values)) or np.any(np.diff(values) < 0.0):
         raise ValueError("knots must be finite and non-decreasing")
     if values[0] != values[degree] or values[-1] != values[-degree - 1] or values[0] == values[-1]:
@@ -57,7 +66,6 @@ def check_knots(knots: ArrayLike, degree: int) -> Array:
         raise ValueError(f"the first and last knot must be repeated {degree + 1} times, not more")
     if inner.size and np.unique(inner, return_counts=True)[1].max() > degree:
         raise ValueError(f"an inner knot is repeated more than {degree} times: the spline would be discontinuous")
-    return values
 
 
 def breakpoints(knots: Array) -> Array:

@@ -57,7 +57,13 @@ class PatchGroup:
     @property
     def coefficients(self) -> Array:
         """Return the control points (k, n_u, n_v, n_w, 3), of rational patches homogeneous, (.., 4)."""
-        return self.control_points if self.weights is None else homogeneous(self.control_points, self.weights)
+        return self.control_points if self.weights is None else self.homogeneous
+
+    @property
+    def homogeneous(self) -> Array:
+        """Return the homogeneous coefficients (k, n_u, n_v, n_w, 4); weights are 1 where there are none."""
+        ones = np.ones(self.control_points.shape[:4])
+        return homogeneous(self.control_points, ones if self.weights is None else self.weights)
 
     def grid(self, u: ArrayLike, v: ArrayLike, w: ArrayLike, derivative: Orders = (0, 0, 0)) -> Array:
         """Return F or one of its partial derivatives on a tensor grid: (k, len(u), len(v), len(w), 3)."""
