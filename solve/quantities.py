@@ -7,18 +7,19 @@ slowly than the spline: a stress is less accurate than the displacement.
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from parameterize.arrays import Array, in_brackets
-from parameterize.spline.bspline import breakpoints, divided_spans, evaluate_at, evaluate_grid, real_array
+from parameterize.arrays import Array, IntArray, in_brackets
+from parameterize.spline.bspline import breakpoints, divided_spans, evaluate_at, real_array
 from parameterize.spline.volume import BSplineVolume
 
 from .discretization.estimate import FIRST
-from .field import Points, SplineField
+from .field import FieldOnBody, Points, SplineField
+from .field_groups import FieldGroup, groups_of
 from .forms.form import Form, Quantity
 
 Place = tuple[float, float, float]
@@ -120,15 +121,20 @@ def on_grid(field: SplineField, form: Form, what: str | Quantity, u: ArrayLike, 
 
 def grid_values(field: SplineField, quantity: Quantity, u: Array, v: Array, w: Array) -> Array:
     """Return a quantity (..., n_u, n_v, n_w) on a grid."""
-    volume = volume_of(field)
-    spline = (field.degrees, field.knots, _vectors(field), (u, v, w))
-    slopes = np.stack([evaluate_grid(*spline, order) for order in FIRST], axis=-1)  # (.., c, 3)
+    volume_of(field)
+    (group,) = groups_of(field)
+    return group_values(group, quantity, u, v, w)[..., 0, :, :, :]
+
+
+def group_values(group: FieldGroup, quantity: Quantity, u: Array, v: Array, w: Array) -> Array:
+    """Return a quantity (..., k, n_u, n_v, n_w) on a grid of each of k patches."""
+    slopes, jacobian = group.values.grid_slopes(u, v, w), group.maps.grid_slopes(u, v, w)
     return _evaluated(
         quantity,
-        np.moveaxis(evaluate_grid(*spline), -1, 0),
+        np.moveaxis(group.values.grid(u, v, w), -1, 0),
         np.moveaxis(slopes, (-2, -1), (0, 1)),
-        np.moveaxis(volume.grid_jacobian(u, v, w), (-2, -1), (0, 1)),
-        Points.on(volume, u, v, w),
+        np.moveaxis(jacobian, (-2, -1), (0, 1)),
+        group.points_on(u, v, w),
     )
 
 
@@ -160,48 +166,104 @@ def _of_shape(found: Array, shape: tuple[int, ...]) -> Array:
     return found
 
 
-def extremes(field: SplineField, form: Form, what: str | Quantity) -> Extremes:
+def extremes(solution: FieldOnBody, what: str | Quantity) -> Extremes:
     """Return the least and the largest value of a quantity of one number a point, and their places."""
-    (found,) = _extremes_of(field, [quantity_of(form, what)], _PER_SPAN)
+    groups = groups_of(solution)
+    (found,) = _extremes_of(groups, [[quantity_of(_form_of(group), what)] for group in groups], _PER_SPAN)
     return found
 
 
-def all_extremes(field: SplineField, form: Form) -> dict[str, Extremes]:
+def all_extremes(solution: FieldOnBody) -> dict[str, Extremes]:
     """Return the extremes of the quantities in reports (`Form.reported`), by name, from one search for all quantities.
 
     The search uses fewer samples a span than `extremes`, so that it takes a small part of the time of a solve.
     """
-    spans = math.prod(len(breakpoints(knots)) - 1 for knots in field.knots)
+    groups = groups_of(solution)
+    spans = sum(len(group) * math.prod(len(breakpoints(knots)) - 1 for knots in group.values.knots) for group in groups)
     per_span = max(1, min(_PER_SPAN, int((_SAMPLES / spans) ** (1.0 / 3.0))))
-    found = _extremes_of(field, [quantity_of(form, name) for name in form.reported], per_span)
-    return dict(zip(form.reported, found, strict=True))
+    names = _form_of(groups[0]).reported
+    quantities = [[quantity_of(_form_of(group), name) for name in names] for group in groups]
+    return dict(zip(names, _extremes_of(groups, quantities, per_span), strict=True))
 
 
-def _extremes_of(field: SplineField, quantities: Sequence[Quantity], per_span: int) -> list[Extremes]:
-    """Return the extremes of q quantities, refined from the best samples.
+def _form_of(group: FieldGroup) -> Form:
+    assert group.problem is not None, "a solution knows its problem"
+    return group.problem.form
 
-    The arrays inside have 2 q rows: first the negative quantities, whose largest values give the least values, then the
-    quantities.
+
+@dataclass(frozen=True, eq=False)
+class _Candidates:
+    """Hold places where r quantities are large.
+
+    values: (r, m). group: (r, m), the number of the group of each place. rows: (r, m), the patch in the group. places:
+    (r, m, 3), parameters. widths: (r, m, 3), of the boxes in which better places are looked for.
     """
 
-    def together(u: Array, grad: Array, x: Array) -> Array:
-        return np.stack([_one_number(quantity(u, grad, x), x.shape[1:]) for quantity in quantities])
+    values: Array
+    group: IntArray
+    rows: IntArray
+    places: Array
+    widths: Array
 
-    rows = [divided_spans(knots, per_span) for knots in field.knots]
-    places, values = np.empty((2 * len(quantities), 0, 3)), np.empty((2 * len(quantities), 0))
-    for u in slabs(*rows):
-        found = _signed(grid_values(field, together, u, *rows[1:]))
-        flat = found.reshape(len(found), -1)
-        best = np.argpartition(-flat, min(_CANDIDATES, flat.shape[1]) - 1)[:, :_CANDIDATES]
-        i, j, k = np.unravel_index(best, found.shape[1:])
-        places = np.concatenate([places, np.stack([u[i], rows[1][j], rows[2][k]], axis=-1)], axis=1)
-        values = np.concatenate([values, np.take_along_axis(flat, best, axis=1)], axis=1)
-    best = np.argsort(-values, axis=1, kind="stable")[:, :_CANDIDATES]
-    places = np.take_along_axis(places, best[..., None], axis=1)
-    places, values = _zoomed(field, together, places, [float(np.diff(row).max()) for row in rows])
-    peaks = [_peak(field, *row) for row in zip(places, values, strict=True)]
-    pairs = zip(peaks[: len(quantities)], peaks[len(quantities) :], strict=True)
+    @classmethod
+    def joined(cls, parts: "Sequence[_Candidates]") -> "_Candidates":
+        """Return the best candidates of all parts."""
+        names = [field.name for field in fields(cls)]
+        every = cls(*(np.concatenate([getattr(part, name) for part in parts], axis=1) for name in names))
+        best = np.argsort(-every.values, axis=1, kind="stable")[:, :_CANDIDATES]
+        return every.chosen(best)
+
+    def chosen(self, columns: IntArray) -> "_Candidates":
+        """Return some of the candidates of each quantity. columns: (r, m)."""
+        each = np.arange(len(columns))[:, None]
+        return _Candidates(*(getattr(self, field.name)[each, columns] for field in fields(self)))
+
+
+def _extremes_of(
+    groups: Sequence[FieldGroup], quantities: Sequence[Sequence[Quantity]], per_span: int
+) -> list[Extremes]:
+    """Return the extremes of q quantities, refined from the best samples.
+
+    quantities: those of each group. The arrays inside have 2 q rows: first the negative quantities, whose largest
+    values give the least values, then the quantities.
+    """
+    together = [_together(own) for own in quantities]
+    parts = [
+        part for number, group in enumerate(groups) for part in _sampled(group, number, together[number], per_span)
+    ]
+    found = _zoomed(groups, together, _Candidates.joined(parts))
+    best = found.chosen(found.values.argmax(axis=1)[:, None])
+    count = len(best.values) // 2
+    peaks = [_peak(groups, best, row) for row in range(2 * count)]
+    pairs = zip(peaks[:count], peaks[count:], strict=True)
     return [Extremes(-least[0], least[1], least[2], *largest) for least, largest in pairs]
+
+
+def _together(quantities: Sequence[Quantity]) -> Quantity:
+    """Return the quantity (2 q, ...) of q quantities with both signs."""
+
+    def values(u: Array, grad: Array, x: Array) -> Array:
+        found = np.stack([_one_number(quantity(u, grad, x), x.shape[1:]) for quantity in quantities])
+        return np.concatenate([-found, found])
+
+    return values
+
+
+def _sampled(group: FieldGroup, number: int, together: Quantity, per_span: int) -> Iterator[_Candidates]:
+    """Yield the best samples of a group, piece after piece."""
+    rows = [divided_spans(knots, per_span) for knots in group.values.knots]
+    widths, patches = [float(np.diff(row).max()) for row in rows], max(1, _POINTS // math.prod(map(len, rows)))
+    for start in range(0, len(group), patches):
+        for u in slabs(*rows):
+            found = group_values(group.take(slice(start, start + patches)), together, u, *rows[1:])
+            flat = found.reshape(len(found), -1)
+            best = np.argpartition(-flat, min(_CANDIDATES, flat.shape[1]) - 1)[:, :_CANDIDATES]
+            patch, i, j, k = np.unravel_index(best, found.shape[1:])
+            places = np.stack([u[i], rows[1][j], rows[2][k]], axis=-1)
+            values = np.take_along_axis(flat, best, axis=1)
+            yield _Candidates(
+                values, np.full(best.shape, number), start + patch, places, np.broadcast_to(widths, places.shape)
+            )
 
 
 def _one_number(found: ArrayLike, shape: tuple[int, ...]) -> Array:
@@ -218,32 +280,45 @@ def _one_number(found: ArrayLike, shape: tuple[int, ...]) -> Array:
     return values.reshape(shape)
 
 
-def _signed(values: Array) -> Array:
-    return np.concatenate([-values, values])
-
-
-def _zoomed(field: SplineField, together: Quantity, places: Array, widths: Sequence[float]) -> tuple[Array, Array]:
-    """Return better places (r, k, 3) of each of r rows, and their values.
+def _zoomed(groups: Sequence[FieldGroup], together: Sequence[Quantity], start: _Candidates) -> _Candidates:
+    """Return better places of each of r quantities, and their values.
 
     Each place moves to the best of the 27 points around it, in smaller and smaller boxes.
     """
-    steps = np.stack(np.meshgrid(*[[-1.0, 0.0, 1.0]] * 3, indexing="ij"), axis=-1).reshape(-1, 3) * widths
-    own = np.arange(len(places))
+    steps = np.stack(np.meshgrid(*[[-1.0, 0.0, 1.0]] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
+    found = start
     for _ in range(_ZOOMS):
-        around = np.clip(places[..., None, :] + steps, 0.0, 1.0)  # (r, k, 27, 3)
-        found = _signed(_values(field, together, around.reshape(-1, 3)))
-        found = found.reshape(len(places), *around.shape[:3])[own, own]  # of each row its own quantity
-        top = found.argmax(axis=2)[..., None]
-        places = np.take_along_axis(around, top[..., None], axis=2)[:, :, 0]
-        values = np.take_along_axis(found, top, axis=2)[:, :, 0]
-        steps = steps / 2.0
-    return places, values
+        around = np.clip(found.places[..., None, :] + steps * found.widths[..., None, :], 0.0, 1.0)  # (r, m, 27, 3)
+        values = np.empty(around.shape[:3])
+        for number in np.unique(found.group).tolist():
+            row, column = np.nonzero(found.group == number)
+            owners = np.repeat(found.rows[row, column], len(steps))
+            every = _at(groups[number], together[number], owners, around[row, column].reshape(-1, 3))
+            own = every.reshape(len(every), len(row), len(steps))[row, np.arange(len(row))]  # of each row its quantity
+            values[row, column] = own
+        top = values.argmax(axis=2)[..., None]
+        found = replace(
+            found,
+            values=np.take_along_axis(values, top, axis=2)[..., 0],
+            places=np.take_along_axis(around, top[..., None], axis=2)[:, :, 0],
+            widths=found.widths / 2.0,
+        )
+    return found
 
 
-def _peak(field: SplineField, places: Array, values: Array) -> tuple[float, Place, Place]:
-    """Return the largest value of one row, its point and its parameters."""
-    best = places[np.argmax(values)]
-    return float(values.max()), tuple(volume_of(field)(best)[0].tolist()), tuple(best.tolist())
+def _at(group: FieldGroup, quantity: Quantity, owners: IntArray, where: Array) -> Array:
+    """Return a quantity (..., m) at parameters (m, 3) of patches (m,) of a group."""
+    u, slopes = group.values.at(owners, where)
+    x, jacobian = group.maps.at(owners, where)
+    u, slopes, jacobian = (np.moveaxis(part, 0, -1) for part in (u, slopes, jacobian))
+    return _evaluated(quantity, u, slopes, jacobian, Points.at(np.ascontiguousarray(x.T), where))
+
+
+def _peak(groups: Sequence[FieldGroup], best: _Candidates, row: int) -> tuple[float, Place, Place]:
+    """Return the best value of one row, its point and its parameters."""
+    group, where = groups[int(best.group[row, 0])], best.places[row]
+    point, _ = group.maps.at(best.rows[row], where)
+    return float(best.values[row, 0]), tuple(point[0].tolist()), tuple(where[0].tolist())
 
 
 def slabs(u: Array, v: Array, w: Array) -> Iterator[Array]:

@@ -1,7 +1,7 @@
 """Defines Solution, the spline that a solve returns, and SolveReport, its numbers."""
 
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
@@ -159,11 +159,11 @@ class PatchSolution(SplineField):
 
     def extremes(self, what: str | Quantity) -> Extremes:
         """Return the least and the largest value of a quantity of one number a point, and their places."""
-        return extremes(self, self.problem.form, what)
+        return extremes(self, what)
 
     def all_extremes(self) -> dict[str, Extremes]:
         """Return the extremes of a report, by name (`problem.form.reported`), from one search for all quantities."""
-        return all_extremes(self, self.problem.form)
+        return all_extremes(self)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -253,15 +253,14 @@ class Solution(BodyField, Shown):
 
     def extremes(self, what: str | Quantity) -> Extremes:
         """Return the least and the largest value of a quantity of one number a point, and their places."""
-        return _outermost([patch.extremes(what) for patch in self.patches])
+        return extremes(self, what)
 
     def all_extremes(self) -> dict[str, Extremes]:
         """Return the extremes of a report, by name (`problem.form.reported`), from one search for all quantities.
 
         The search uses fewer samples than `extremes` on fine meshes.
         """
-        each = [patch.all_extremes() for patch in self.patches]
-        return {name: _outermost([found[name] for found in each]) for name in each[0]}
+        return all_extremes(self)
 
     def to_pyvista(
         self, samples: int | None = None, quantities: Iterable[str] | Mapping[str, Quantity] | None = None
@@ -291,9 +290,3 @@ class Solution(BodyField, Shown):
         here.
         """
         return above("figures.solution").plot_solution(self, what, file)
-
-
-def _outermost(found: Sequence[Extremes]) -> Extremes:
-    """Return the extremes of a body from those of its patches."""
-    least, largest = min(found, key=lambda one: one.least), max(found, key=lambda one: one.largest)
-    return replace(largest, least=least.least, least_at=least.least_at, least_parameters=least.least_parameters)
