@@ -10,14 +10,15 @@ from numpy.typing import ArrayLike
 
 from parameterize.arrays import Array, Knots
 from parameterize.display import Brief
-from parameterize.files import array_names, load_arrays, save_arrays
+from parameterize.files import array_names, save_arrays
 from parameterize.quality.distances import nearest_on_boundary
+from parameterize.spline.archive import BASIS, load_patch_arrays, named_arrays
 from parameterize.spline.body import Body, BodyLike, all_control_points, as_body
 from parameterize.spline.bspline import evaluate_at, evaluate_grid
 from parameterize.spline.sampled_boundary import SampledBoundary
 from parameterize.spline.volume import BSplineVolume, checked_knots, load_spline, save_spline
 
-ARRAYS = ("degrees", "knots_u", "knots_v", "knots_w", "coefficients")  # of a patch in solution.npz
+ARRAYS = (*BASIS, "coefficients")  # of a patch in solution.npz
 FARTHEST = 1e4  # of the volume's size: from there rounding hides which point of it is nearest
 
 
@@ -280,12 +281,11 @@ class BodyField(Brief, FieldOnBody):
 
         coefficients: those of each patch, by default its own.
         """
-        found: dict[str, Array] = {}
-        for number, (patch, values) in enumerate(zip(self.patches, coefficients or self._coefficients, strict=True)):
-            parts = (np.array(patch.degrees), *patch.knots, values)
-            prefix = "" if self.is_single else f"p{number}_"
-            found |= {prefix + name: array for name, array in zip(ARRAYS, parts, strict=True)}
-        return found
+        parts = [
+            dict(zip(ARRAYS, (np.array(patch.degrees), *patch.knots, values), strict=True))
+            for patch, values in zip(self.patches, coefficients or self._coefficients, strict=True)
+        ]
+        return parts[0] if self.is_single else named_arrays(parts)
 
     @property
     def _coefficients(self) -> list[Array]:
@@ -301,13 +301,11 @@ class BodyField(Brief, FieldOnBody):
 
         Raises FileNotFoundError, or a ValueError that names the defect of the file.
         """
-        count = sum(name.endswith("_degrees") for name in array_names(path))
-        if count == 0:
+        if not any(name.endswith("_degrees") for name in array_names(path)):
             return BodyField((SplineField.load(path),))
-        arrays = load_arrays(path, tuple(f"p{number}_{name}" for number in range(count) for name in ARRAYS))
         patches = []
-        for number in range(count):
-            degrees, *knots, coefficients = (arrays[f"p{number}_{name}"] for name in ARRAYS)
+        for number, arrays in enumerate(load_patch_arrays(path, ("coefficients",))):
+            degrees, *knots, coefficients = (arrays[name] for name in ARRAYS)
             patches.append(_checked(f"{path}: patch {number}", degrees, knots, coefficients))
         return BodyField(tuple(patches))
 

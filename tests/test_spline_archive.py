@@ -6,9 +6,11 @@ from bodies import exact_ring, ring, row_of
 from glued import demand_same
 
 import iga_nn
-from parameterize.files import load_arrays, save_arrays
+from parameterize.files import array_names, load_arrays, save_arrays
+from parameterize.spline import archive
 from parameterize.spline.body import Body
 from solve import benchmark_volume
+from solve.field import BodyField, SplineField
 
 TURNS = [((0, 1, 2), (False, False, False)), ((1, 2, 0), (True, False, True)), ((2, 1, 0), (False, True, False))]
 PLACES = [(0, 0, 0), (1, 0, 0), (1, 1, 0)]
@@ -34,6 +36,41 @@ def test_one_patch_is_written_as_a_volume(tmp_path):
     assert (tmp_path / "body.npz").read_bytes() == (tmp_path / "volume.npz").read_bytes()
     assert isinstance(iga_nn.load_volume(tmp_path / "body.npz"), iga_nn.BSplineVolume)
     assert len(Body.load(tmp_path / "volume.npz")) == 1
+
+
+@pytest.fixture
+def in_groups(monkeypatch):
+    """Patches are written in groups although they are few."""
+    monkeypatch.setattr(archive, "MOST_APART", 1)
+
+
+@pytest.mark.parametrize("body", [row_of(PLACES, TURNS), ring(3), exact_ring(), row_of(PLACES, TURNS[:1] * 3)])
+def test_many_patches_are_written_in_groups_and_read_again(body, in_groups, tmp_path):
+    body.save(tmp_path / "body.npz")
+    again = iga_nn.load_volume(tmp_path / "body.npz")
+    assert again.interfaces == body.interfaces
+    demand_same(again, body)
+    assert len(array_names(tmp_path / "body.npz")) == 1 + (6 + (body.patches[0].weights is not None)) * len(body.groups)
+
+
+def test_a_field_on_many_patches_is_written_in_groups(in_groups, tmp_path):
+    body = row_of(PLACES, TURNS)
+    field = BodyField(tuple(SplineField(one.degrees, one.knots, one.control_points) for one in body))
+    field.save(tmp_path / "solution.npz")
+    again = BodyField.load(tmp_path / "solution.npz")
+    for one, other in zip(again.patches, field.patches, strict=True):
+        assert one.degrees == other.degrees and np.array_equal(one.coefficients, other.coefficients)
+
+
+@pytest.mark.parametrize(
+    "change", [lambda row: row[1:], lambda row: 0 * row, lambda row: row + 1, lambda row: 1.0 * row]
+)
+def test_damaged_groups_are_refused(change, in_groups, tmp_path):
+    row_of(PLACES, TURNS[:1] * 3).save(tmp_path / "body.npz")
+    held = load_arrays(tmp_path / "body.npz", tuple(array_names(tmp_path / "body.npz")))
+    save_arrays(tmp_path / "bad.npz", **held | {"g0_patches": change(held["g0_patches"])})
+    with pytest.raises(iga_nn.InputError, match=r"bad\.npz: each patch must be in one group"):
+        iga_nn.load_volume(tmp_path / "bad.npz")
 
 
 @pytest.mark.parametrize(
