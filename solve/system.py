@@ -13,6 +13,7 @@ from scipy.sparse.linalg import LinearOperator
 from parameterize.arrays import Array
 from parameterize.conjugate_gradients import LinearResult, conjugate_gradients
 from parameterize.spline.body import Body
+from parameterize.spline.bspline import greville
 from parameterize.spline.interface import Interface
 from parameterize.threads import one_blas_thread
 
@@ -125,6 +126,17 @@ class System:
     def preconditioner(self) -> LinearOperator:
         """Return an approximate inverse of A; it is symmetric, and positive unless the solution's constant is open."""
         return self._linear(self.precondition)
+
+    @property
+    def points(self) -> Array:
+        """Return the points (m, 3) of the free coefficients of a component: the images of their Greville points."""
+        grids = []
+        for patch in self.patches:
+            u, v, w = (
+                greville(knots, degree) for knots, degree in zip(patch.space.knots, patch.space.degrees, strict=True)
+            )
+            grids.append(np.moveaxis(patch.volume.grid(u, v, w), -1, 0))
+        return self.unknowns.chosen(grids).reshape(3, -1).T
 
     def at_rest(self) -> "System":
         """Return the same system with the value zero wherever values are given; its fields are zero there."""

@@ -34,7 +34,7 @@ def test_entries_and_factor(law, make):
     matrix = sparse(system.unknowns, [patch.matrix for patch in system.patches], len(system.right))
     whole = system.operator @ np.eye(len(system.load))
     assert matrix.toarray() == pytest.approx(whole, abs=1e-12 * np.abs(whole).max())
-    solve = factorized(matrix)
+    solve = factorized(matrix, system.points)
     right = np.random.default_rng(0).standard_normal((len(system.load), 2))
     assert solve is not None and whole @ solve(right) == pytest.approx(right, abs=1e-8)
 
@@ -42,7 +42,7 @@ def test_entries_and_factor(law, make):
 def test_a_matrix_that_is_not_positive_has_no_factor():
     system = iga_nn.discretize(bent(), LAWS["strong"])
     matrix = sparse(system.unknowns, [patch.matrix for patch in system.patches], 3)
-    assert factorized(-matrix) is None
+    assert factorized(-matrix, system.points) is None
 
 
 def test_a_factor_takes_over_when_it_is_paid_for():

@@ -5,12 +5,13 @@ from itertools import product
 
 import numpy as np
 from scipy.sparse import coo_array, csc_array, diags_array
-from scipy.sparse.linalg import splu
 
 from parameterize.arrays import Array, IntArray
 
 from ..discretization.operator import MatrixFree
 from ..discretization.unknowns import Unknowns
+from .cholesky import cholesky, touching
+from .dissection import Dissection
 
 # Shares of its diagonal that are added to a matrix, tried in turn: rounding may make a positive matrix indefinite. The
 # first one is least: of a foil, 1 : 20 000, it is 1000 times the lowest eigenvalue.
@@ -63,17 +64,12 @@ def price_of(unknowns: Unknowns, matrices: Sequence[MatrixFree], components: int
     return made / 2 + components * int(np.prod(unknowns.shape)) / PER_UNKNOWN
 
 
-def factorized(matrix: csc_array) -> Callable[[Array], Array] | None:
+def factorized(matrix: csc_array, points: Array) -> Callable[[Array], Array] | None:
     """Return the function that solves with a symmetric positive matrix (N, N) for columns (N, m).
 
-    None is returned for a matrix that is not positive even with the largest of SHARES.
+    points: (n, 3), where N = c n: unknown i + k n, of component k, belongs to point i; near points are neighbours. None
+    is returned for a matrix that is not positive even with the largest of SHARES.
     """
-    for share in SHARES:
-        shifted = (matrix + diags_array(share * matrix.diagonal())).tocsc()
-        try:
-            factor = splu(shifted, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
-        except RuntimeError:  # it is singular
-            continue
-        if factor.U.diagonal().min() > 0.0:
-            return lambda right: np.asarray(factor.solve(np.ascontiguousarray(right)), dtype=np.float64)
-    return None
+    tree = Dissection.of(touching(matrix, len(points)), points)
+    shifted = ((matrix + diags_array(share * matrix.diagonal())).tocsc() for share in SHARES)
+    return next(filter(None, (cholesky(one, tree) for one in shifted)), None)
