@@ -1,7 +1,8 @@
 """Assembles the operator and the load of a problem, with the data on faces and regions."""
 
+from collections.abc import Hashable, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
@@ -9,15 +10,18 @@ from parameterize.arrays import Array
 from parameterize.spline.volume import FACE_NAMES, BSplineVolume
 
 from .discretization.face_data import FaceRule, boundary_coefficients, face_rule, has_face
+from .discretization.grouped import BodyMatrix, Law, assemble_body
+from .discretization.groups import Layout, OnPatches
 from .discretization.on_regions import weak_faces
-from .discretization.operator import FormOperator, Operator, assemble
-from .discretization.quadrature import rule_of
+from .discretization.operator import FormOperator, Operator
+from .discretization.roughness import Measured, rules_of
 from .discretization.space import TrialSpace
 from .discretization.unknowns import Unknowns
 from .discretization.weak import WeakFace
 from .field import Points
 from .forms.boundary_value_problem import BoundaryValueProblem
 from .forms.form import check_law
+from .forms.mass import WithMass
 from .forms.problem import Problem
 from .options import SolveOptions
 
@@ -25,33 +29,99 @@ SAMPLES = np.array([0.07, 0.35, 0.62, 0.91])  # parameters a direction at which 
 LARGEST_IMBALANCE = 0.01  # of the data's size; quadrature leaves far less of data in balance
 
 
+class Stated(Protocol):
+    """Describe a problem on one patch of a body: its volume, the problem with the patch's data, and the trial space."""
+
+    @property
+    def volume(self) -> BSplineVolume:
+        """Return the map."""
+
+    @property
+    def problem(self) -> BoundaryValueProblem:
+        """Return the problem with the data of the patch."""
+
+    @property
+    def space(self) -> TrialSpace:
+        """Return the trial space."""
+
+
+class Assembled(NamedTuple):
+    """Hold the matrix of a body, and for each patch the loads and the fixed coefficients (c, n_u, n_v, n_w)."""
+
+    matrix: BodyMatrix
+    loads: OnPatches
+    known: OnPatches
+
+
+def assemble_body_data(patches: Sequence[Stated], options: SolveOptions, shift: float = 0.0) -> Assembled:
+    """Return the matrix, the loads with the data on faces and regions, and the fixed coefficients of all patches.
+
+    shift: the factor of the mass matrix that is added to that of the law.
+    """
+    couples = _check_laws(patches)
+    same = [_in_volume(patch.problem) if len(patches) > 1 else None for patch in patches]
+    measured = [
+        Measured(patch.volume, patch.space, patch.problem.form.tensor, law)
+        for patch, law in zip(patches, same, strict=True)
+    ]
+    laws = []
+    for patch, rule, law in zip(patches, rules_of(measured, options.quadrature), same, strict=True):
+        form, source = patch.problem.form, patch.problem.source_at
+        component = 0 if form.components == 1 and form.symmetric and not couples else None
+        form = form if shift == 0.0 else WithMass(form, shift)
+        laws.append(Law(patch.volume, patch.space, rule, form, source, component, law))
+    layout = Layout.of([patch.space for patch in patches])
+    matrix, loads = assemble_body(layout, laws, options.thread_count)
+    known = layout.empty(loads.components)
+    terms: list[dict[str, Any]] = []
+    for patch, load, given in zip(patches, loads, known, strict=True):
+        volume, problem, space = patch.volume, patch.problem, patch.space
+        with space.agreed():
+            on_boundary = _on_regions if problem.conditions else _on_faces
+            terms.append(on_boundary(volume, problem, space, load))
+        if space.dirichlet:
+            whole = boundary_coefficients(volume, space.whole, problem.boundary_at, loads.components)
+            given[:] = whole[:, space.rows]
+    return Assembled(matrix.with_faces(terms), loads, known)
+
+
+def _check_laws(patches: Sequence[Stated]) -> bool:
+    """Return whether a user's law couples u with its gradient. Raises ValueError for a law that is not what it says."""
+    forms = {id(patch.problem.form): patch.problem.form for patch in patches if isinstance(patch.problem, Problem)}
+    couples = False
+    for form in forms.values():
+        grids = [
+            np.moveaxis(patch.volume.grid(SAMPLES, SAMPLES, SAMPLES), -1, 0).reshape(3, -1)
+            for patch in patches
+            if patch.problem.form is form
+        ]
+        one = len(grids) == 1
+        couples |= check_law(form, Points.of(grids[0], (SAMPLES,) * 3) if one else np.concatenate(grids, axis=1))
+    return couples
+
+
+def _in_volume(problem: BoundaryValueProblem) -> Hashable:
+    """Return what a problem's law and source are made of; a user's law is known by its object."""
+    return problem.in_volume, id(problem.form) if isinstance(problem, Problem) else type(problem.form).__name__
+
+
 def assemble_data(
     volume: BSplineVolume, problem: BoundaryValueProblem, space: TrialSpace, options: SolveOptions
 ) -> tuple[Operator | FormOperator, Array, Array]:
-    """Return the operator, the load with the data on faces and regions, and the fixed coefficients.
+    """Return the operator, the load with the data on faces and regions, and the fixed coefficients of one patch.
 
     The load and the coefficients have the shape (c, n_u, n_v, n_w).
     """
-    form, couples = problem.form, False
-    if isinstance(problem, Problem):
-        samples = np.moveaxis(volume.grid(SAMPLES, SAMPLES, SAMPLES), -1, 0).reshape(3, -1)
-        couples = check_law(form, Points.of(samples, (SAMPLES, SAMPLES, SAMPLES)))
-    operator, load = assemble(
-        volume,
-        space,
-        form,
-        problem.source_at,
-        rule_of(volume, space, form.tensor, options.quadrature),
-        component=0 if form.components == 1 and form.symmetric and not couples else None,
-        threads=options.thread_count,
-    )
-    with space.agreed():
-        if problem.conditions:
-            terms: dict[str, Any] = _on_regions(volume, problem, space, load)
-        else:
-            terms = _on_faces(volume, problem, space, load)
-    known = boundary_coefficients(volume, space.whole, problem.boundary_at, form.components)
-    return replace(operator, faces=terms), load, known[:, space.rows].copy()
+    matrix, loads, known = assemble_body_data([OnePatch(volume, problem, space)], options)
+    return matrix.parts[0], loads[0], known[0]
+
+
+class OnePatch(NamedTuple):
+    """State a problem on one patch."""
+
+    volume: BSplineVolume
+    problem: BoundaryValueProblem
+    space: TrialSpace
 
 
 def _on_faces(

@@ -1,5 +1,6 @@
 """Defines PatchProblem, a problem on one patch of a body, and PatchSystem, its matrix, preconditioner and loads."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -7,13 +8,12 @@ import numpy as np
 from parameterize.arrays import Array
 from parameterize.spline.volume import BSplineVolume
 
-from .assembly import assemble_data
-from .discretization.operator import FormOperator, Operator, with_mass
+from .assembly import Assembled
+from .discretization.operator import FormOperator, Operator
 from .discretization.space import TrialSpace
 from .discretization.weak import WeakFace
 from .forms.boundary_value_problem import BoundaryValueProblem
 from .linear.preconditioner import FastDiagonalization, blocks_of
-from .options import SolveOptions
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,42 +41,35 @@ class PatchSystem(PatchProblem):
     operators: tuple[Operator, ...]
     blocks: tuple[FastDiagonalization | None, ...]
 
-    @classmethod
-    def of(cls, patch: PatchProblem, options: SolveOptions, shift: float = 0.0) -> "PatchSystem":
-        """Return the system of a patch, with `shift` times the mass in its matrix."""
-        volume, problem, space = patch.volume, patch.problem, patch.space
-        matrix, loads, known = assemble_data(volume, problem, space, options)
-        if shift != 0.0:
-            matrix = with_mass(volume, matrix, problem.form, shift)
-        operators = scalar_operators(matrix, len(known))
-        return cls(
-            volume,
-            problem,
-            space,
-            matrix=matrix,
-            known=known,
-            loads=loads,
-            operators=operators,
-            blocks=blocks_of(operators),
-        )
-
     @property
     def weak(self) -> list[WeakFace]:
         """Return the faces of the patch with terms of conditions on regions."""
         return [face for face in self.matrix.faces.values() if isinstance(face, WeakFace)]
 
-    @property
-    def right(self) -> Array:
-        """Return the loads minus the matrix times the known coefficients."""
-        return self.loads - self.matrix.apply(self.known)
-
-    def with_matrix(self, matrix: Operator | FormOperator) -> "PatchSystem":
-        """Return the same system whose matrix shares its arrays with those of other patches."""
-        return replace(self, matrix=matrix, operators=(matrix,) if isinstance(matrix, Operator) else self.operators)
-
     def at_rest(self) -> "PatchSystem":
         """Return the same system with the value zero wherever values are given."""
         return replace(self, known=np.zeros_like(self.known))
+
+
+def systems_of(patches: Sequence[PatchProblem], found: Assembled) -> tuple[PatchSystem, ...]:
+    """Return the systems of all patches from what is assembled on them."""
+    matrix, components = found.matrix, found.loads.components
+    is_scalar = isinstance(matrix.parts[0], Operator)
+    each = [matrix.parts] if is_scalar else [matrix.block(i).parts for i in range(components)]
+    rows = zip(patches, matrix.parts, found.loads, found.known, zip(*each, strict=True), strict=True)
+    return tuple(
+        PatchSystem(
+            patch.volume,
+            patch.problem,
+            patch.space,
+            matrix=own,
+            known=known,
+            loads=loads,
+            operators=operators,
+            blocks=blocks_of(operators),
+        )
+        for patch, own, loads, known, operators in rows
+    )
 
 
 def scalar_operators(matrix: Operator | FormOperator, components: int) -> tuple[Operator, ...]:

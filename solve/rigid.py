@@ -42,7 +42,7 @@ def rigid_motions(system: System) -> Array:
         motions = _without_energy([system.patches[i] for i in part])
         supports = [one for i in part for one in _supports(system.patches[i], fixed[i], motions)]
         free = motions.combined(_unheld(supports)) if supports and motions.count else motions
-        parts = [np.zeros((free.count, *patch.right.shape)) for patch in system.patches]
+        parts = [np.zeros((free.count, *patch.loads.shape)) for patch in system.patches]
         for i in part:
             parts[i] = free.coefficients(system.patches[i])
         found += [system.unknowns.chosen(each).ravel() for each in zip(*parts, strict=True)]

@@ -17,14 +17,14 @@ from parameterize.spline.bspline import greville
 from parameterize.spline.interface import Interface
 from parameterize.threads import one_blas_thread
 
-from .assembly import balanced
+from .assembly import assemble_body_data, balanced
 from .diagnostics import ConvergenceError, failure, judge, map_notices
 from .discretization.error_norms import Compared, Errors, error_norms, missing_mean
 from .discretization.estimate import error_estimate
-from .discretization.grouped import BodyMatrix
-from .discretization.groups import Layout
+from .discretization.grouped import BodyMatrix, Law, assemble_body
 from .discretization.on_regions import demand_area, demand_supports
-from .discretization.operator import FormOperator, Operator, assemble
+from .discretization.operator import FormOperator, Operator
+from .discretization.quadrature import GaussRule, operator_rule
 from .discretization.space import TrialSpace, embedded, longest_edge
 from .discretization.unknowns import Glued, Unknowns, unknowns_of
 from .field import BodyField, FieldOnBody, SplineField
@@ -34,7 +34,7 @@ from .linear.glued import Coarse, GluedPreconditioner, shares_of
 from .linear.krylov import generalized_residuals
 from .linear.preconditioner import FastDiagonalization
 from .options import IterationOptions, SolveOptions, check_device
-from .patch_system import PatchProblem, PatchSystem
+from .patch_system import PatchProblem, PatchSystem, systems_of
 from .reactions import balance
 from .solution import Solution, SolveReport
 
@@ -113,8 +113,13 @@ class System:
     @functools.cached_property
     def mass(self) -> LinearOperator:
         """Return the mass matrix, the integrals of u . v."""
-        each = [assemble(patch.volume, patch.space, Mass(), threads=patch.matrix.threads)[0] for patch in self.patches]
-        whole = BodyMatrix.of(self.matrix.layout, each)
+        rules: dict[int, GaussRule] = {}
+        laws = []
+        for law in self.matrix.laws:
+            if id(law.rule) not in rules:
+                rules[id(law.rule)] = operator_rule(law.space, "spline")
+            laws.append(Law(law.volume, law.space, rules[id(law.rule)], Mass()))
+        whole, _ = assemble_body(self.matrix.layout, laws, self.matrix.parts[0].threads)
         return self._linear(lambda x: self._product(x, whole))
 
     @property
@@ -357,13 +362,12 @@ def build(
     is_loose = is_loose or shift != 0.0
     start = time.process_time()
     with one_blas_thread():
-        systems = tuple(PatchSystem.of(patch, options, shift) for patch in patches)
-        matrix = BodyMatrix.of(Layout.of([patch.space for patch in patches]), [one.matrix for one in systems])
-        systems = tuple(one.with_matrix(own) for one, own in zip(systems, matrix.parts, strict=True))
+        found = assemble_body_data(patches, options, shift)
+        matrix, loads = found.matrix, found.loads
+        unknowns = unknowns_of([patch.space for patch in patches], body.interfaces)
+        known = matrix.layout.joined(unknowns.completed(found.known))
+        systems = systems_of(patches, found._replace(known=known))
         _demand_held(body, problem, systems, is_loose)
-        unknowns = unknowns_of([patch.space for patch in systems], body.interfaces)
-        known = unknowns.completed([system.known for system in systems])
-        systems = tuple(replace(system, known=own) for system, own in zip(systems, known, strict=True))
         parts = [system.blocks for system in systems], [system.operators for system in systems]
         blocks = preconditioners(unknowns, *parts, body.interfaces)
         if blocks[0].singular and not is_loose and isinstance(systems[0].matrix, FormOperator):
@@ -371,7 +375,7 @@ def build(
                 f"{type(problem.form).__name__} without a reaction, and with Neumann data on all faces, does not "
                 "determine the solution: give a value, or an exchange, on a face or a region"
             )
-        right = unknowns.collect([system.right for system in systems])
+        right = unknowns.collect(replace(loads, flat=loads.flat - matrix.apply(known).flat))
         right = balanced(right, unknowns, systems[0].space) if blocks[0].singular and not is_loose else right
         setup = time.process_time() - start
     return System(body, problem, systems, matrix, unknowns, blocks, right, setup)

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import iga_nn
-from solve.discretization.grouped import BodyMatrix
 from solve.discretization.groups import Layout
+from solve.discretization.operator import assemble
 from solve.discretization.space import trial_space
 
 
@@ -54,6 +54,33 @@ def test_a_body_multiplies_as_its_patches_do(problem):
 
 def test_patches_share_the_arrays_of_their_stack():
     system = iga_nn.discretize(row_of((3, 3)), iga_nn.Poisson(source="1"))
-    assert isinstance(system.matrix, BodyMatrix)
-    ((_, stack),) = system.matrix.stacks
+    (stack,) = system.matrix.stacks
     assert all(np.shares_memory(stack.factors, patch.matrix.factors) for patch in system.patches)
+
+
+@pytest.mark.parametrize(
+    "problem",
+    [
+        iga_nn.Poisson(source="x*y", kappa={0: "1+x", 1: "1+x", 2: 2, 3: "1+x"}, reaction="x"),
+        iga_nn.Elasticity(body_force=("0", "x", "1"), young={0: 1, 1: 2, 2: 1, 3: 1}, displacement=("0", "0", "0")),
+        iga_nn.Problem(iga_nn.Poisson(source="0", kappa="1+y"), source=lambda x: x[0] * x[1]),
+    ],
+)
+def test_a_stack_is_assembled_as_its_patches_are(problem):
+    body = row_of((3, 3, 3, 3))
+    system = iga_nn.discretize(body, problem)
+    assert len(system.matrix.stacks) == 1 and not system.matrix.alone
+    placed = problem.on(body).on_patches(body)
+    for patch, own in zip(system.patches, placed, strict=True):
+        how = {"rule": patch.matrix.rule, "component": patch.matrix.component if own.form.components == 1 else None}
+        matrix, load = assemble(patch.volume, patch.space, own.form, own.source_at, **how)
+        name = "factors" if own.form.components == 1 else "rows"
+        assert np.allclose(getattr(matrix, name), getattr(patch.matrix, name), rtol=1e-12, atol=1e-15)
+        assert np.allclose(load, patch.loads, rtol=1e-12, atol=1e-15)
+        assert np.allclose(patch.operators[-1].diagonal(), matrix_diagonal(patch, own), rtol=1e-12, atol=1e-15)
+
+
+def matrix_diagonal(patch, problem):
+    """Return the diagonal of the last component's block, assembled on the patch alone."""
+    last = problem.form.components - 1
+    return assemble(patch.volume, patch.space, problem.form, rule=patch.matrix.rule, component=last)[0].diagonal()

@@ -6,9 +6,10 @@ from parameterize.spline.bspline import collocation
 from parameterize.spline.orientation import mirrored
 from parameterize.spline.volume import BSplineVolume
 from solve import Elasticity, Form, Poisson
-from solve.discretization.operator import FormOperator, assemble, colours
+from solve.discretization.operator import FormOperator, assemble
 from solve.discretization.quadrature import gauss_rule, operator_rule
 from solve.discretization.space import trial_space
+from solve.discretization.stack import colours
 from solve.study import benchmark_volume
 
 

@@ -5,7 +5,7 @@ import pytest
 from volumes import mapped
 
 from parameterize.spline.volume import BSplineVolume
-from solve.discretization.quadrature import is_rough
+from solve.discretization.roughness import Measured, roughness
 from solve.discretization.space import trial_space
 from solve.study import benchmark_volume
 
@@ -13,7 +13,7 @@ IDENTITY = np.array([1.0, 0.0, 0.0, 1.0, 0.0, 1.0])
 
 
 def rough(volume, factor=lambda x: np.ones(x.shape[1:]), refine=0, tensor=IDENTITY):
-    return is_rough(volume, trial_space(volume, refine), lambda x: np.multiply.outer(tensor, factor(x)))
+    return roughness([Measured(volume, trial_space(volume, refine), lambda x: np.multiply.outer(tensor, factor(x)))])[0]
 
 
 def test_a_smooth_map_is_rough_only_on_few_spans():

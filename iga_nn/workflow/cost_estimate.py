@@ -22,7 +22,7 @@ from parameterize.spline.body import BodyLike, as_body
 from parameterize.spline.volume import BSplineVolume
 from parameterize.surface.surface import Surface
 from solve.discretization.error_norms import POINTS
-from solve.discretization.quadrature import rule_of
+from solve.discretization.roughness import rule_of
 from solve.discretization.space import trial_space
 from solve.forms.boundary_value_problem import BoundaryValueProblem
 from solve.options import SolveOptions

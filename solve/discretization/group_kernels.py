@@ -1,40 +1,142 @@
-"""Runs the compiled kernels of one patch over the patches of a group: arrays have a leading dimension of patches."""
+"""Runs the compiled kernels of one patch over the patches of a stack: arrays have a leading dimension of patches.
+
+Tables have a leading dimension of kinds, of which `kinds` says the number for each patch.
+"""
 
 import numpy as np
 
 from parameterize.arrays import Array, IntArray
 
-from .kernels import Tables, compiled, evaluate_plane, multiply_planes, spread_plane, turn
+from .kernels import (
+    Tables,
+    compiled,
+    evaluate_plane,
+    multiply_planes,
+    plane_rows,
+    spread,
+    spread_plane,
+    tensor_factors,
+    turn,
+)
 
 
 @compiled
-def of_patch(tables: Tables, i: int) -> Tables:
-    """Return the tables of one patch from tables with a leading dimension of patches."""
+def of_kind(tables: Tables, kind: int) -> Tables:
+    """Return the tables of one kind."""
     (first_u, u, functions_u), (first_v, v, functions_v), (first_w, w, functions_w) = tables
-    return (first_u[i], u[i], functions_u), (first_v[i], v[i], functions_v), (first_w[i], w[i], functions_w)
+    return (
+        (first_u[kind], u[kind], functions_u),
+        (first_v[kind], v[kind], functions_v),
+        (first_w[kind], w[kind], functions_w),
+    )
+
+
+@compiled
+def evaluate_splines(
+    coefficients: Array, which: IntArray, kinds: IntArray, point: int, tables: Tables, result: Array
+) -> None:
+    """Write the splines of m patches on the plane of a point of u to result (m, c, 4, q_w, q_v).
+
+    coefficients: (k, c, n_u, n_v, n_w). which: (m,), the places of the patches among these. kinds: (m,).
+    """
+    for m in range(len(which)):
+        splines, own = coefficients[which[m]], of_kind(tables, kinds[m])
+        for c in range(len(splines)):
+            evaluate_plane(splines[c], point, own, result[m, c])
+
+
+@compiled
+def spread_splines(
+    fields: Array, which: IntArray, kinds: IntArray, point: int, tables: Tables, has_value: bool, result: Array
+) -> None:
+    """Apply the transpose of `evaluate_splines`: add fields (m, c, 4, q_w, q_v) to result (k, c, n_u, n_v, n_w).
+
+    The first of the four entries is added only if `has_value`.
+    """
+    for m in range(len(which)):
+        total, own = result[which[m]], of_kind(tables, kinds[m])
+        for c in range(len(total)):
+            spread_plane(fields[m, c], point, own, has_value, total[c])
+
+
+@compiled
+def turn_fields(rows: Array, source: Array, result: Array, back: bool) -> None:
+    """Apply `turn` to rows (m, 3, 3, q_w, q_v) and fields (m, c, 3, q_w, q_v) of m patches."""
+    for m in range(len(rows)):
+        turn(rows[m], source[m], result[m], back)
+
+
+@compiled
+def rows_of_maps(fields: Array, weights: Array, kinds: IntArray, rows: Array, measure: Array) -> None:
+    """Apply `plane_rows` to the maps (m, 3 or 4, 4, q_w, q_v) of patches of the given kinds (m,)."""
+    for m in range(len(fields)):
+        plane_rows(fields[m], weights[kinds[m]], rows[m], measure[m])
+
+
+@compiled
+def tensors_of_rows(rows: Array, kappa: Array, patches: IntArray, point: int, factors: Array) -> None:
+    """Apply `tensor_factors` to rows (m, 3, 3, q_w, q_v) and kappa (m, 6, q_w, q_v) of some patches.
+
+    factors: (k, q_u, 6 or 7, q_w, q_v), of all patches.
+    """
+    for m in range(len(rows)):
+        tensor_factors(rows[m], kappa[m], factors[patches[m], point])
+
+
+@compiled
+def spread_fields(fields: Array, kinds: IntArray, tables: Tables, slopes: tuple[int, int], result: Array) -> None:
+    """Integrate fields (m, c, q_w, q_v), with weights, times each function of v and w: add to result (m, c, n_v, n_w).
+
+    kinds: (m,). slopes: for v and w, the number of the table's values that are taken, 0 for the functions themselves.
+    """
+    _, (first_v, v, functions_v), (first_w, w, functions_w) = tables
+    d_v, d_w = slopes
+    n_w = result.shape[3]
+    lines = np.empty((fields.shape[3], n_w))
+    for m in range(len(fields)):
+        kind = kinds[m]
+        for c in range(fields.shape[1]):
+            turned = np.zeros((n_w, fields.shape[3]))
+            spread(first_w[kind], w[kind, d_w], functions_w, fields[m, c], turned)
+            lines[:, :] = turned.T
+            spread(first_v[kind], v[kind, d_v], functions_v, lines, result[m, c])
 
 
 @compiled
 def multiply_patches(
-    coefficients: Array, patches: IntArray, piece: IntArray, tables: Tables, factors: Array, result: Array
+    coefficients: Array,
+    places: IntArray,
+    patches: IntArray,
+    points: IntArray,
+    kinds: IntArray,
+    tables: Tables,
+    factors: Array,
+    result: Array,
 ) -> None:
-    """Add the products of some scalar operators and coefficients (patches, c, n_u, n_v, n_w) of a group to a result.
+    """Add the part of some patches and points of u to products of scalar operators and coefficients of a group.
 
-    patches: (k,), the place of each operator's coefficients. piece: the numbers of some of the k operators. tables:
-    those of all operators, with a leading dimension k. factors: (k, q_u, 6 or 7, q_w, q_v).
+    coefficients, result: (g, c, n_u, n_v, n_w), of a group. places: (k,), the place in the group of each patch of a
+    stack. patches: the numbers of some of the k patches. factors: (k, q_u, 6 or 7, q_w, q_v).
     """
-    points = np.arange(factors.shape[1])
-    for i in piece:
-        source, total, own = coefficients[patches[i]], result[patches[i]], of_patch(tables, i)
+    for i in patches:
+        source, total, own = coefficients[places[i]], result[places[i]], of_kind(tables, kinds[i])
         for c in range(len(source)):
             multiply_planes(source[c], points, own, factors[i], total[c])
 
 
 @compiled
 def multiply_laws(
-    coefficients: Array, patches: IntArray, piece: IntArray, tables: Tables, rows: Array, laws: Array, result: Array
+    coefficients: Array,
+    places: IntArray,
+    patches: IntArray,
+    points: IntArray,
+    kinds: IntArray,
+    tables: Tables,
+    rows: Array,
+    laws: Array,
+    result: Array,
 ) -> None:
-    """Add the products of some constant laws and coefficients (patches, c, n_u, n_v, n_w) of a group to a result.
+    """Add the part of some patches and points of u to products of constant laws and coefficients of a group.
 
     Arguments as in `multiply_patches`. rows: (k, q_u, 3, 3, q_w, q_v), those of `plane_rows`. laws: (k, c, 3, c, 3),
     the matrix from a gradient to its flux.
@@ -42,9 +144,9 @@ def multiply_laws(
     count, plane = coefficients.shape[1], rows.shape[4:]
     fields = np.empty((count, 4, *plane))
     gradient, flux = np.empty((count, 3, *plane)), np.empty((count, 3, *plane))
-    for i in piece:
-        source, total, own = coefficients[patches[i]], result[patches[i]], of_patch(tables, i)
-        for point in range(rows.shape[1]):
+    for i in patches:
+        source, total, own = coefficients[places[i]], result[places[i]], of_kind(tables, kinds[i])
+        for point in points:
             for c in range(count):
                 evaluate_plane(source[c], point, own, fields[c])
             turn(rows[i, point], fields[:, 1:], gradient, False)

@@ -1,132 +1,163 @@
-"""Applies the matrices of all patches of a body at once: those of one shape are one array, which compiled kernels pass.
+"""Assembles and applies the matrices of all patches of a body: patches of one shape are one stack.
 
-Factors (q_u, .., q_w, q_v) of a patch become factors (k, q_u, .., q_w, q_v) of k patches that have equal degrees, equal
-numbers of functions and of quadrature points. Threads take pieces of patches. A matrix of one patch stays as it is: its
-pieces are planes of points.
+Their factors (q_u, .., q_w, q_v) are parts of an array (k, q_u, .., q_w, q_v), which compiled kernels pass.
 """
 
-from collections.abc import Sequence
+from collections import defaultdict
+from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from parameterize.arrays import Array, IntArray
-from parameterize.threads import in_parallel
+from parameterize.spline.volume import BSplineVolume
 
 from ..forms.form import Form
-from . import group_kernels, kernels
+from . import group_kernels
 from .groups import Layout, OnPatches
-from .operator import FaceTerm, FormOperator, MatrixFree, Operator
+from .operator import FaceTerm, Source, assemble_stack, multiply_law
+from .quadrature import GaussRule
+from .space import TrialSpace
+from .stack import Piece, Stack
 
-PIECES = 16  # of a stack, a thread: some wait less where others take longer
-FEWEST = 4  # patches of a piece
+
+class Law(NamedTuple):
+    """State what the matrix and the load of a patch are assembled from, as `operator.assemble` takes it.
+
+    component: the component whose symmetric part is assembled; None for the whole law. same: equal for patches whose
+    laws and sources are the same functions of the points.
+    """
+
+    volume: BSplineVolume
+    space: TrialSpace
+    rule: GaussRule
+    form: Form
+    source: Source | None = None
+    component: int | None = 0
+    same: Hashable = None
 
 
 @dataclass(frozen=True, eq=False)
-class Stack:
-    """Apply the matrices of k patches of one group.
+class StackMatrix:
+    """Apply the matrices of the patches of a stack.
 
-    patches: (k,), the places of the patches in their group. tables: those of the patches, with a leading dimension k.
-    factors: (k, q_u, .., q_w, q_v), of scalar laws, or the rows of constant laws. laws: (k, c, 3, c, 3), the matrices
-    of constant laws from a gradient to its flux; None for factors.
+    group: the number of the group that the patches belong to. places: (k,), their places in it. forms: the law of each
+    patch. factors: what their operators store at the points, (k, q_u, .., q_w, q_v), of scalar laws factors, of
+    constant ones rows; None for other laws. laws: (k, c, 3, c, 3), of constant laws the matrix from a gradient to its
+    flux.
     """
 
-    patches: IntArray
-    tables: kernels.Tables
-    factors: Array
+    stack: Stack
+    group: int
+    places: IntArray
+    forms: Sequence[Form]
+    factors: Array | None
     laws: Array | None
-    threads: int
-
-    @classmethod
-    def of(cls, patches: Sequence[int], matrices: Sequence[MatrixFree]) -> "Stack":
-        """Return the stack of matrices with the same `key_of`."""
-        u, v, w = (
-            (np.stack([first for first, _, _ in each]), np.stack([basis for _, basis, _ in each]), each[0][2])
-            for each in zip(*(matrix.tables for matrix in matrices), strict=True)
-        )
-        laws = [law_of(matrix.form) for matrix in matrices if isinstance(matrix, FormOperator)]
-        factors = np.stack([stored(matrix) for matrix in matrices])
-        return cls(np.array(patches), (u, v, w), factors, np.stack(laws) if laws else None, matrices[0].threads)
 
     def add_product(self, coefficients: Array, result: Array) -> None:
-        """Add the products with coefficients (patches, c, n_u, n_v, n_w) of a group to a result of the same shape."""
-        count = len(self.patches)
-        pieces = np.array_split(np.arange(count), max(1, min(PIECES * self.threads, count // FEWEST)))
-        in_parallel(lambda piece: self._multiply(piece, coefficients, result), pieces, self.threads)
+        """Add the products with coefficients (patches, c, n_u, n_v, n_w) of the group to a result of that shape."""
+        stack = self.stack
 
-    def _multiply(self, piece: IntArray, coefficients: Array, result: Array) -> None:
-        """Add the products of a piece of the k patches."""
-        where = self.patches, piece, self.tables, self.factors
-        if self.laws is None:
-            group_kernels.multiply_patches(coefficients, *where, result)
-        else:
-            group_kernels.multiply_laws(coefficients, *where, self.laws, result)
+        def multiply(piece: Piece) -> None:
+            if self.factors is None:
+                multiply_law(stack, piece, self.places, self.forms[piece[0][0]], coefficients, result)
+                return
+            where = self.places, *piece, stack.kinds, stack.tables, self.factors
+            if self.laws is None:
+                group_kernels.multiply_patches(coefficients, *where, result)
+            else:
+                group_kernels.multiply_laws(coefficients, *where, self.laws, result)
+
+        stack.on_pieces(multiply)
 
 
 @dataclass(frozen=True, eq=False)
 class BodyMatrix:
     """Apply the matrices of all patches of a body.
 
-    parts: the matrix of each patch, whose arrays at the points are parts of the stacks. stacks: with the number of the
-    group of each. alone: the numbers of the patches whose matrices are in no stack. faces: the terms on faces of
-    patches in stacks, with the number of the patch.
+    parts: the matrix of each patch, with the terms on its faces; what they store at the points is part of the stacks.
+    alone: the numbers of the patches that are in no stack, because no other patch has their shape.
     """
 
     layout: Layout
+    laws: Sequence[Law]
     parts: Sequence[Any]  # MatrixFree
-    stacks: Sequence[tuple[int, Stack]]
+    stacks: Sequence[StackMatrix]
     alone: Sequence[int]
-    faces: Sequence[tuple[int, FaceTerm]]
-
-    @classmethod
-    def of(cls, layout: Layout, matrices: Sequence[MatrixFree]) -> "BodyMatrix":
-        """Return the matrix of a body from those of its patches, whose arrays at the points are copied into stacks."""
-        parts, stacks, alone, faces = list(matrices), [], [], []
-        for number, group in enumerate(layout.groups):
-            found: dict[Any, list[int]] = {}
-            for place, patch in enumerate(group):
-                found.setdefault(key_of(matrices[patch]), []).append(place)
-            for key, places in found.items():
-                own = [group[place] for place in places]
-                if key is None or len(own) == 1:
-                    alone += own
-                    continue
-                stack = Stack.of(places, [matrices[patch] for patch in own])
-                stacks.append((number, stack))
-                for patch, factors in zip(own, stack.factors, strict=True):
-                    name = "rows" if isinstance(parts[patch], FormOperator) else "factors"
-                    parts[patch] = replace(parts[patch], **{name: factors})
-                faces += [(patch, face) for patch in own for face in matrices[patch].faces.values()]
-        return cls(layout, parts, stacks, alone, faces)
 
     def apply(self, coefficients: Sequence[Array]) -> OnPatches:
         """Return the products (c, n_u, n_v, n_w) with all coefficients of each patch, fixed ones included."""
         source = self.layout.joined(coefficients)
         result = self.layout.empty(source.components)
         groups = list(zip(source.in_groups, result.in_groups, strict=True))
-        for number, stack in self.stacks:
-            stack.add_product(*groups[number])
+        for matrix in self.stacks:
+            matrix.add_product(*groups[matrix.group])
         for patch in self.alone:
             result[patch][:] = self.parts[patch].apply(source[patch])
-        for patch, face in self.faces:
+        for patch, face in self._faces:
             face.add_product(source[patch], result[patch])
         return result
 
+    @property
+    def _faces(self) -> list[tuple[int, FaceTerm]]:
+        """Return the terms on faces of the patches in stacks, with the number of the patch."""
+        alone = set(self.alone)
+        return [(i, face) for i, own in enumerate(self.parts) if i not in alone for face in own.faces.values()]
 
-def key_of(matrix: MatrixFree) -> Any:
-    """Return what patches have in common whose matrices are stacked; None for a matrix that is applied alone."""
-    if isinstance(matrix, Operator):
-        return matrix.factors.shape
-    if isinstance(matrix, FormOperator) and matrix.rows is not None:
-        return matrix.rows.shape, matrix.form.components
-    return None
+    def with_faces(self, faces: Sequence[dict[str, Any]]) -> "BodyMatrix":
+        """Return the same matrix with terms on faces of each patch."""
+        return replace(self, parts=[replace(own, faces=more) for own, more in zip(self.parts, faces, strict=True)])
+
+    def block(self, component: int) -> "BodyMatrix":
+        """Return the symmetric part of a component's diagonal block, for its own gradient and value."""
+        laws = [law._replace(source=None, component=component) for law in self.laws]
+        found, _ = assemble_body(self.layout, laws, self.parts[0].threads)
+        both = zip(found.parts, self.parts, strict=True)
+        return replace(found, parts=[replace(block, faces=own.faces, component=component) for block, own in both])
 
 
-def stored(matrix: MatrixFree) -> Array:
-    """Return the array that a matrix of a stack holds at its points."""
-    name = "rows" if isinstance(matrix, FormOperator) else "factors"
-    return np.asarray(getattr(matrix, name))
+def assemble_body(layout: Layout, laws: Sequence[Law], threads: int) -> tuple[BodyMatrix, OnPatches]:
+    """Return the matrix and the loads (c, n_u, n_v, n_w) of the laws on all patches, without terms on faces."""
+    parts: list[Any] = [None] * len(laws)
+    loads, stacks, alone = layout.empty(laws[0].form.components), [], []
+    for number, (group, own_loads) in enumerate(zip(layout.groups, loads.in_groups, strict=True)):
+        for places in _stacks([laws[patch] for patch in group]):
+            own = [laws[group[place]] for place in places]
+            stack = _stack_of(own, threads)
+            forms, sources, component = [law.form for law in own], [law.source for law in own], own[0].component
+            found, stored, own_loads[places] = assemble_stack(stack, forms, sources, component)
+            for place, matrix in zip(places, found, strict=True):
+                parts[group[place]] = matrix
+            if len(places) == 1:
+                alone.append(group[places[0]])
+                continue
+            is_constant = stored is not None and component is None
+            matrices = np.stack(list(map(law_of, forms))) if is_constant else None
+            stacks.append(StackMatrix(stack, number, np.array(places), forms, stored, matrices))
+    return BodyMatrix(layout, laws, parts, stacks, alone), loads
+
+
+def _stacks(laws: Sequence[Law]) -> list[list[int]]:
+    """Return the numbers of the laws of each stack, those with the same functions one after another."""
+    found: dict[Any, dict[Any, list[int]]] = defaultdict(lambda: defaultdict(list))
+    for number, (volume, _, rule, form, _, component, same) in enumerate(laws):
+        of_law = form.components, form.has_reaction, form.constant, component
+        key = volume.degrees, volume.shape, volume.weights is None, rule.shape, of_law
+        found[key][same].append(number)
+    return [[number for own in runs.values() for number in own] for runs in found.values()]
+
+
+def _stack_of(laws: Sequence[Law], threads: int) -> Stack:
+    """Return the stack of patches of one shape, in whose order equal laws follow each other."""
+    ends = [i for i in range(1, len(laws)) if laws[i].same != laws[i - 1].same]
+    return Stack(
+        [law.space for law in laws],
+        [law.rule for law in laws],
+        threads,
+        [law.volume for law in laws],
+        (0, *ends, len(laws)),
+    )
 
 
 def law_of(form: Form) -> Array:

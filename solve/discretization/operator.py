@@ -5,7 +5,7 @@ on planes of points: gradients are pulled back, the law turns them into fluxes, 
 """
 
 import math
-from collections.abc import Callable, Collection, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, Protocol
@@ -14,17 +14,18 @@ import numpy as np
 
 from parameterize.arrays import Array, IntArray
 from parameterize.spline.bspline import collocation
-from parameterize.spline.orientation import orientation
 from parameterize.spline.volume import BSplineVolume
 from parameterize.threads import in_parallel
 
 from ..forms.form import Form, reaction
-from ..forms.jets import PAIRS
-from ..forms.mass import WithMass
-from . import kernels
-from .quadrature import GaussRule, geometry_planes, operator_rule
+from . import group_kernels, kernels
+from .quadrature import GaussRule, operator_rule
 from .space import TrialSpace
+from .stack import Piece, Stack, colours
 from .unknowns import Window
+
+Source = Callable[[Array], Array]
+ONE = np.zeros(1, dtype=np.int64)  # the number of the patch of a stack of one
 
 
 class FaceTerm(Protocol):
@@ -41,25 +42,6 @@ class FaceTerm(Protocol):
 
     def stiffness(self, component: int) -> float:
         """Return the integral of the factor of u . v for one component, the mean over the face's parameters."""
-
-
-SHARES = 4  # of the pieces of one colour a thread: some wait less where others take longer
-LAYERS = 4  # of elements in a piece of work, where the degree allows so few
-
-
-def colours(first: IntArray, degree: int, threads: int) -> list[list[IntArray]]:
-    """Return consecutive points in pieces, as two lists that take the pieces by turns.
-
-    first: (q,), the number of the first function that is not zero at each point. A piece covers at least as many layers
-    of elements as the degree, so that no two pieces of one list share a basis function: these pieces may be added to
-    the same array at the same time, and each sum has one order. The pieces of one list are joined to a few shares a
-    thread, or to one share for a single thread.
-    """
-    layers = np.unique(first, return_inverse=True)[1]
-    pieces = np.split(np.arange(len(first)), np.flatnonzero(np.diff(layers // max(degree, LAYERS))) + 1)
-    shares = SHARES * threads if threads > 1 else 1
-    halves = pieces[0::2], pieces[1::2]
-    return [[np.concatenate(half[i::shares]) for i in range(min(len(half), shares))] for half in halves]
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,6 +62,11 @@ class MatrixFree:
     def tables(self) -> kernels.Tables:
         """Return the tables of the trial basis at the points of the quadrature rule."""
         return self.rule.tabulate(self.space.degrees, self.space.knots)
+
+    @property
+    def stack(self) -> Stack:
+        """Return the patch as a stack of one."""
+        return Stack((self.space,), (self.rule,), self.threads)
 
     def on_planes(self, task: Callable[[IntArray], None]) -> None:
         """Run a task on all points of u, in pieces.
@@ -128,18 +115,7 @@ class Operator(MatrixFree):
 
         For a slab it is the diagonal of the integrals over its spans.
         """
-        result = np.zeros(self.space.shape)
-        products = [  # per direction, (3, q, degree + 1): values of B B, B B' and B' B' at index sum of derivatives
-            (first, np.stack([b[0] ** 2, b[0] * b[1], b[1] ** 2]), functions) for first, b, functions in self.tables
-        ]
-
-        def add(points: IntArray) -> None:
-            for q in points:
-                for entry, pair in zip(self.factors[q], (*PAIRS, ()), strict=False):
-                    twice = 2.0 if len(set(pair)) == 2 else 1.0
-                    add_integrals(products, q, twice * entry, result, tuple(pair.count(a) for a in range(3)))
-
-        self.on_planes(add)
+        result = self.stack.diagonals(self.factors[None])[0]
         on_faces = np.zeros(self.space.shape)
         for face in self.faces.values():
             face.add_diagonal(self.component, on_faces)
@@ -164,26 +140,14 @@ class FormOperator(MatrixFree):
     form: Form
     rows: Array | None
 
+    @cached_property
+    def stack(self) -> Stack:
+        """Return the patch as a stack of one, with its map."""
+        return Stack((self.space,), (self.rule,), self.threads, (self.volume,), (0, 1))
+
     def _multiply(self, points: IntArray, coefficients: Array, result: Array) -> None:
-        form, shape = self.form, self.rule.plane_shape
-        fields, gradient = np.empty((len(coefficients), 4, *shape)), np.empty((len(coefficients), 3, *shape))
-        kept = self.rows
-        planes: Iterable[tuple[int, Array, Any, Any]] = geometry_planes(self.volume, self.rule, points)
-        if kept is not None:
-            planes = ((q, kept[q], None, None) for q in points)
-        for q, rows, measure, x in planes:
-            for component, plane in zip(coefficients, fields, strict=True):
-                kernels.evaluate_plane(component, q, self.tables, plane)
-            kernels.turn(rows, fields[:, 1:], gradient, False)
-            values = fields[:, 0]
-            if measure is not None:
-                scale = np.sqrt(np.abs(measure))
-                values = values * scale
-                fields[:, 0] = reaction(form, values, gradient, x) * scale
-            flux = np.ascontiguousarray(form.flux(values, gradient, x), dtype=np.float64)
-            kernels.turn(rows, flux, fields[:, 1:], True)
-            for plane, total in zip(fields, result, strict=True):
-                kernels.spread_plane(plane, q, self.tables, form.has_reaction, total)
+        rows = None if self.rows is None else self.rows[None]
+        multiply_law(self.stack, (ONE, points), ONE, self.form, coefficients[None], result[None], rows)
 
     def block(self, component: int) -> Operator:
         """Return the symmetric part of a component's diagonal block, for its own gradient and value."""
@@ -197,7 +161,7 @@ def assemble(
     volume: BSplineVolume,
     space: TrialSpace,
     form: Form,
-    source: Callable[[Array], Array] | None = None,
+    source: Source | None = None,
     rule: GaussRule | None = None,
     *,
     component: int | None = 0,
@@ -215,74 +179,114 @@ def assemble(
     space. Raises a ValueError that names a point where det J is zero.
     """
     rule = rule or operator_rule(space, "spline")
-    parts = space, rule, threads
-    basis, part = MatrixFree(*parts), component or 0
-    load = np.zeros((form.components, *space.shape))
-    negative = []
+    stack = Stack((space,), (rule,), threads, (volume,), (0, 1))
+    found, _, loads = assemble_stack(stack, [form], [source], component)
+    return found[0], loads[0]
+
+
+def assemble_stack(
+    stack: Stack, forms: Sequence[Form], sources: Sequence[Source | None], component: int | None
+) -> tuple[list[Any], Array | None, Array]:
+    """Return the operators and the loads (k, c, n_u, n_v, n_w) of the laws of a stack's patches, as `assemble` does.
+
+    What the operators store at the points, factors or rows, is part of one array (k, q_u, .., q_w, q_v), which is
+    returned between them; None where they store nothing.
+    """
+    form, part, count, q_u = forms[0], component or 0, len(stack), stack.shape[0]
+    loads = np.zeros((count, form.components, *stack.space.shape))
+    negative, volumes = np.zeros((count, q_u), dtype=np.int64), np.zeros((count, q_u))
     factors = kept = None
 
-    def fill(points: IntArray) -> None:
-        for q, rows, measure, x in geometry_planes(volume, rule, points):
-            negative.append(_count_negative(measure, rule, q))
+    def fill(piece: Piece) -> None:
+        patches, _ = piece
+        law, source, shape = forms[patches[0]], sources[patches[0]], (len(patches), *stack.plane_shape)
+        for q, rows, measure, x in stack.geometry(piece):
+            _demand_invertible(stack, patches, q, measure)
+            negative[patches, q], volumes[patches, q] = (measure < 0.0).sum(axis=(1, 2)), measure.sum(axis=(1, 2))
             size = np.abs(measure)
             if kept is not None:
-                kept[q] = rows
+                kept[patches, q] = rows
             if factors is not None:
-                kernels.tensor_factors(rows, np.ascontiguousarray(form.tensor(x, part)), factors[q])
-                if form.has_reaction:
-                    np.multiply(form.mass(x, part), size, out=factors[q, 6])
+                kappa = np.moveaxis(law.tensor(x, part).reshape(6, *shape), 1, 0)
+                group_kernels.tensors_of_rows(rows, np.ascontiguousarray(kappa), patches, q, factors)
+                if law.has_reaction:
+                    factors[patches, q, 6] = law.mass(x, part).reshape(shape) * size
             if source is not None:
-                for density, total in zip(source(x), load, strict=True):
-                    add_integrals(basis.tables, q, density * size, total)
+                densities = source(x).reshape(-1, *shape) * size
+                stack.add_integrals(patches, q, np.moveaxis(densities, 1, 0), loads)
 
-    with space.agreed():
+    with stack.space.agreed():
         if component is not None:
-            factors = np.empty((rule.shape[0], 6 + form.has_reaction, *rule.plane_shape))
+            factors = np.empty((count, q_u, 6 + form.has_reaction, *stack.plane_shape))
         elif form.constant:
-            kept = np.empty((rule.shape[0], 3, 3, *rule.plane_shape))
-        basis.on_planes(fill)
-    folded = space.total(sum(negative))
-    if folded and orientation(volume) < 0:
-        folded = space.total(int(np.prod(rule.shape))) - folded
-    if factors is None:
-        return FormOperator(*parts, volume, form, kept, folded=folded), load
-    return Operator(*parts, factors, folded=folded), load
+            kept = np.empty((count, q_u, 3, 3, *stack.plane_shape))
+        stack.on_pieces(fill)
+    folded = _folded(stack, negative.sum(axis=1), volumes.sum(axis=1))
+    stored = kept if factors is None else factors
+    own: Any = [None] * count if stored is None else stored
+    found: list[Any] = []
+    for i, (space, rule, at_points) in enumerate(zip(stack.spaces, stack.rules, own, strict=True)):
+        if factors is None:
+            law = stack.volumes[i], forms[i], at_points
+            found.append(FormOperator(space, rule, stack.threads, *law, folded=folded[i]))
+        else:
+            found.append(Operator(space, rule, stack.threads, at_points, folded=folded[i]))
+    return found, stored, loads
 
 
-def with_mass(
-    volume: BSplineVolume, operator: Operator | FormOperator, form: Form, factor: float
-) -> Operator | FormOperator:
-    """Return the operator of a law on a volume plus `factor` times the mass matrix, with the terms on faces."""
-    law = WithMass(form, factor)
-    if isinstance(operator, FormOperator):
-        return replace(operator, form=law, rows=None)
-    whole, _ = assemble(volume, operator.space, law, rule=operator.rule, threads=operator.threads)
-    assert isinstance(whole, Operator)
-    return replace(operator, factors=whole.factors)
-
-
-def add_integrals(
-    tables: Collection[kernels.Table], q: int, field: Array, result: Array, kinds: tuple[int, ...] = (0, 0, 0)
+def multiply_law(
+    stack: Stack,
+    piece: Piece,
+    places: IntArray,
+    form: Form,
+    coefficients: Array,
+    result: Array,
+    kept: Array | None = None,
 ) -> None:
-    """Add the integrals of a field (q_w, q_v) of a plane, with weights, times each function to (n_u, n_v, n_w).
+    """Add the part of some patches and points of u to the products of a law and coefficients of a group.
 
-    kinds: for each direction, 0 for the values in its table and 1 for the derivatives.
+    places: (k,), the place of each patch of the stack in its group. coefficients, result: (g, c, n_u, n_v, n_w), of the
+    group. kept: the rows of a constant law at all points; None where they are computed.
     """
-    (first, u, _), (first_v, v, functions_v), (first_w, w, functions_w) = tables
-    _, n_v, n_w = result.shape
-    lines, plane = np.zeros((n_w, field.shape[1])), np.zeros((n_v, n_w))
-    kernels.spread(first_w, w[kinds[2]], functions_w, field, lines)
-    kernels.spread(first_v, v[kinds[1]], functions_v, np.ascontiguousarray(lines.T), plane)
-    result[first[q] : first[q] + u.shape[2]] += np.multiply.outer(u[kinds[0], q], plane)
+    patches, points = piece
+    which, kinds, count = places[patches], stack.kinds[patches], len(patches)
+    fields = np.empty((count, coefficients.shape[1], 4, *stack.plane_shape))
+    gradient = np.empty((count, coefficients.shape[1], 3, *stack.plane_shape))
+    planes: Iterable[tuple[int, Array, Any, Any]] = stack.geometry(piece)
+    if kept is not None:
+        planes = ((q, kept[patches[0] : patches[-1] + 1, q], None, None) for q in points)
+    for q, rows, measure, x in planes:
+        group_kernels.evaluate_splines(coefficients, which, kinds, q, stack.tables, fields)
+        group_kernels.turn_fields(rows, fields[:, :, 1:], gradient, False)
+        values, slopes = fields[:, :, 0], gradient
+        values, slopes = (part[0] if count == 1 else np.moveaxis(part, 0, -3) for part in (values, slopes))
+        if measure is not None:
+            scale = np.sqrt(np.abs(measure))
+            scale = scale[0] if count == 1 else scale
+            values = values * scale
+            react = reaction(form, values, slopes, x) * scale
+            fields[:, :, 0] = np.moveaxis(react.reshape(len(react), *measure.shape), 1, 0)
+        flux = np.asarray(form.flux(values, slopes, x), dtype=np.float64)
+        flux = np.moveaxis(flux.reshape(*flux.shape[:2], count, *stack.plane_shape), 2, 0)
+        group_kernels.turn_fields(rows, np.ascontiguousarray(flux), fields[:, :, 1:], True)
+        group_kernels.spread_splines(fields, which, kinds, q, stack.tables, form.has_reaction, result)
 
 
-def _count_negative(measure: Array, rule: GaussRule, q: int) -> int:
-    """Return the number of points with det J < 0 on the plane of point `q`, from measure (q_w, q_v) = w det J."""
-    if measure.min() > 0.0:
-        return 0
-    flat = np.argwhere(measure == 0.0)
-    if flat.size:
-        w, v = flat[0]
-        where = tuple(float(rule.points[a][i]) for a, i in enumerate((q, v, w)))
-        raise ValueError(f"volume: det J is zero at the parameters {where}; such a map has no inverse there")
-    return int(np.count_nonzero(measure < 0.0))
+def _demand_invertible(stack: Stack, patches: IntArray, q: int, measure: Array) -> None:
+    """Raise ValueError where det J is zero on the planes of point `q`, from measure (m, q_w, q_v) = w det J."""
+    if measure.all():
+        return
+    m, w, v = np.argwhere(measure == 0.0)[0]
+    where = tuple(float(stack.rules[patches[m]].points[a][i]) for a, i in enumerate((q, v, w)))
+    raise ValueError(f"volume: det J is zero at the parameters {where}; such a map has no inverse there")
+
+
+def _folded(stack: Stack, negative: IntArray, volumes: Array) -> list[int]:
+    """Return the number of points of each patch where det J has the other sign than its integral.
+
+    negative: (k,), the number of points with det J < 0. volumes: (k,), the integrals of det J over a process's points.
+    """
+    total = stack.space.total
+    points = total(math.prod(stack.shape))
+    numbers: Any = total(negative)
+    return [int(n) for n in np.where(total(volumes) < 0.0, points - numbers, numbers)]

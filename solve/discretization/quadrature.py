@@ -5,7 +5,7 @@ The Gauss rules of a spline space integrate its functions exactly with half as m
 """
 
 import logging
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -14,7 +14,7 @@ from scipy.sparse import csr_array, hstack
 from scipy.sparse.linalg import splu
 
 from parameterize.arrays import Array, Knots
-from parameterize.spline.bspline import basis_derivatives, breakpoints, gauss_points, greville, midpoints, sparse_rows
+from parameterize.spline.bspline import basis_derivatives, breakpoints, gauss_points, greville, sparse_rows
 from parameterize.spline.volume import BSplineVolume
 
 from ..field import Points
@@ -26,10 +26,7 @@ MAX_STEPS = 60  # of Newton's method: uniform knots take 6 to 10, irregular ones
 SPARE_POINTS = (0, 1, 2)  # the numbers of further points with which it is tried, one after another
 LARGEST_STEP = 0.4  # of a weight over itself, and of a point over the distance to its neighbour
 QUADRATURES = ("spline", "gauss", "gauss+1")
-SAMPLES = 6  # places a direction, each three neighbouring spans, at which a map is measured
 MANY_POINTS = 4  # degree from which on the rules of spline spaces suffice beside glued faces
-LIMIT = 0.03  # trained maps reach 0.06 and more after two refinements, the twisted cube 0.02 with 14 elements
-TIMES = (1.0, 2.0, 2.0, 1.0, 2.0, 1.0)  # number of times that each of the six entries stands in a symmetric matrix
 
 log = logging.getLogger(__name__)
 
@@ -88,8 +85,8 @@ def gauss_rule(space: TrialSpace, counts: Sequence[int] | None = None) -> GaussR
 def operator_rule(space: TrialSpace, quadrature: str, rough: bool = True) -> GaussRule:
     """Return the quadrature rule of the operator.
 
-    quadrature: a name as in `solve_problem`. rough: whether the factors vary much from span to span (`is_rough`), which
-    needs more points. Raises ValueError for any other quadrature.
+    quadrature: a name as in `solve_problem`. rough: whether the factors vary much from span to span (`roughness`), so
+    that more points are needed. Raises ValueError for any other quadrature.
     """
     if quadrature not in QUADRATURES:
         raise ValueError(f"quadrature must be one of {', '.join(QUADRATURES)}, got {quadrature!r}")
@@ -99,14 +96,6 @@ def operator_rule(space: TrialSpace, quadrature: str, rough: bool = True) -> Gau
         return gauss_rule(space, [degree + 1 for degree in space.degrees])
     each = zip(space.whole.knots, space.degrees, space.gauss_points, space.glued_ends, strict=True)
     return _tensor_rule(space, [_with_ends(*direction, rough) for direction in each])
-
-
-def rule_of(volume: BSplineVolume, space: TrialSpace, tensor: Callable[[Points], Array], quadrature: str) -> GaussRule:
-    """Return the quadrature rule of a law's operator on a volume.
-
-    tensor: the law's tensor, as in `is_rough`. quadrature: a name, as in `operator_rule`.
-    """
-    return operator_rule(space, quadrature, quadrature == "spline" and is_rough(volume, space.whole, tensor))
 
 
 def _with_ends(knots: Array, degree: int, gauss: int, glued: tuple[bool, bool], rough: bool) -> tuple[Array, Array]:
@@ -236,7 +225,7 @@ def map_planes(
         for component, out in zip(components, splines, strict=True):
             kernels.evaluate_plane(component, q, tables, out)
         if len(splines) > 3:
-            _divide(fields, splines[3])
+            divide(fields, splines[3])
         yield q, fields, Points.of(fields[:, 0], (u[q : q + 1], v, w), (2, 1))
 
 
@@ -259,7 +248,7 @@ def map_rows(
         yield q, components, tables
 
 
-def _divide(fields: Array, weight: Array) -> None:
+def divide(fields: Array, weight: Array) -> None:
     """Divide components A (3, 4, q_w, q_v), values and gradients, by the weight W (4, q_w, q_v) in place."""
     fields[:, 0] /= weight[0]
     fields[:, 1:] = (fields[:, 1:] - fields[:, :1] * weight[1:]) / weight[0]
@@ -276,37 +265,3 @@ def geometry_planes(
     for q, fields, x in map_planes(volume, rule, points):
         kernels.plane_rows(fields, rule.plane_weights(q), rows, measure)
         yield q, rows, measure, x
-
-
-def is_rough(volume: BSplineVolume, space: TrialSpace, tensor: Callable[[Points], Array]) -> bool:
-    """Return whether G = det J J^-1 kappa J^-T varies much from span to span of a trial space.
-
-    The measure is the second difference of G between the midpoints of three neighbouring spans, relative to G, at
-    SAMPLES^3 places. G is rough where the root mean square of these exceeds LIMIT in a direction, and on fewer than
-    three spans. tensor: a function of points (3, ...) that returns the six entries of kappa (6, ...).
-    """
-    u, v, w = (_stencils(knots) for knots in space.knots)
-    rule = GaussRule((u, v, w), (np.ones_like(u), np.ones_like(v), np.ones_like(w)))
-    factors = np.empty((len(u), 6, *rule.plane_shape))
-    with np.errstate(all="ignore"):  # of a map without an inverse the assembly speaks
-        for q, rows, _, x in geometry_planes(volume, rule):
-            kernels.tensor_factors(rows, np.ascontiguousarray(tensor(x)), factors[q])
-        return not all(_bend(factors, axis) <= LIMIT for axis in (0, 2, 3))
-
-
-def _stencils(knots: Array) -> Array:
-    """Return the midpoints of SAMPLES times three neighbouring spans; of all spans where these are fewer than three."""
-    middles = midpoints(knots)
-    if len(middles) < 3:
-        return middles
-    centers = np.linspace(1, len(middles) - 2, SAMPLES).round().astype(int)
-    return middles[(centers[:, None] + [-1, 0, 1]).ravel()]
-
-
-def _bend(factors: Array, axis: int) -> float:
-    """Return the root mean square of relative second differences along an axis of triples; infinite without triples."""
-    if factors.shape[axis] < 3:
-        return np.inf
-    low, middle, high = (np.moveaxis(factors, (1, axis), (-1, 0))[i::3] for i in range(3))  # (triples, .., .., 6)
-    squares = ((low - 2.0 * middle + high) ** 2 @ TIMES) / (middle**2 @ TIMES)
-    return float(np.sqrt(squares.mean()))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Hashable, Iterator, Mapping
 from copy import copy
 from typing import Any, ClassVar, Self
 
@@ -165,6 +165,11 @@ class BoundaryValueProblem:
     def by_patch(self) -> dict[str, set[int]]:
         """Return the numbers of the patches for which data are given one by one, by the name of the datum."""
         return {datum.name: set(datum.patches) for _, datum in self._datums if isinstance(datum, ByPatch)}
+
+    @property
+    def in_volume(self) -> Hashable:
+        """Return what the law and its data in the volume are made of: the same for patches where they are the same."""
+        return tuple((role, datum.entries) for role, datum in self.data.items())
 
     @property
     def loads(self) -> list[str]:

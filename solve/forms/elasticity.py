@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Hashable, Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass, field
 from numbers import Real
 from typing import Any, ClassVar, Self
@@ -142,6 +142,11 @@ class Elasticity(LawWithData):
                     raise ValueError(f"{name} has no entry for patch {patch}: give one a patch")
                 object.__setattr__(other, name, given[patch])
         return other
+
+    @property
+    def in_volume(self) -> Hashable:
+        """Return what the law and its data in the volume are made of: the same for patches where they are the same."""
+        return super().in_volume, self.constants
 
     def flux(self, u: Any, grad: Any, x: Any) -> Any:
         """Return the stress sigma (3, 3, ...)."""
