@@ -19,7 +19,8 @@ from ..arrays import Array, Floats, IntArray, Mask
 from ..display import Brief, Shown, above
 from .archive import is_of_patches, load_patches, save_patches
 from .interface import WEIGHT_TOLERANCE, Face, Interface, axis_side, face_label, face_layer, knots_agree
-from .interface_rows import face_numbers, gaps, interfaces_of, kinds, oriented, rows_of
+from .interface_rows import face_numbers, gaps, group_places, interfaces_of, kinds, oriented, rows_of
+from .location import locate
 from .patch_groups import PatchGroup, groups_of
 from .volume import FACE_NAMES, BSplineVolume, demand_volume
 
@@ -206,13 +207,13 @@ class Body(Brief, Shown):
         owners, where = np.asarray(patches), np.asarray(parameters, dtype=np.float64)
         if owners.shape != (len(where),) or where.shape[1:] != (3,):
             raise ValueError(f"give patches (m,) and parameters (m, 3), got shapes {owners.shape} and {where.shape}")
-        if unknown := sorted(set(np.unique(owners).tolist()) - set(range(len(self)))):
+        if len(unknown := np.setdiff1d(owners, np.arange(len(self)))):
             raise ValueError(f"there is no patch {unknown[0]}: the body has {len(self)}, from 0 on")
-        found = np.empty(where.shape)
-        for number, patch in enumerate(self.patches):
-            own = np.flatnonzero(owners == number)
-            if own.size:
-                found[own] = patch(where[own])
+        owners, found = owners.astype(np.int64), np.empty(where.shape)
+        labels, places = group_places(self.groups)
+        for label in np.unique(labels[owners]):
+            own = np.flatnonzero(labels[owners] == label)
+            found[own] = self.groups[label].at(places[owners[own]], where[own])
         return found
 
     def locate(self, points: ArrayLike) -> tuple[IntArray, Array]:
@@ -220,14 +221,7 @@ class Body(Brief, Shown):
 
         On an interface the patch with the smaller number is taken. Raises ValueError as `BSplineVolume.locate`.
         """
-        where = self.patches[0].locate(points)
-        owners: IntArray = np.where(np.isnan(where[:, 0]), -1, 0)
-        for number, patch in enumerate(self.patches[1:], start=1):
-            missing = np.flatnonzero(owners < 0)
-            if len(missing):
-                where[missing] = patch.locate(np.atleast_2d(np.asarray(points, dtype=np.float64))[missing])
-                owners[missing] = np.where(np.isnan(where[missing, 0]), -1, number)
-        return owners, where
+        return locate(self.patches, points)
 
     @property
     def nearly_glued(self) -> list[tuple[Interface, float]]:

@@ -18,6 +18,7 @@ from scipy.sparse import csr_array
 from ..arrays import Array, IntArray
 
 _ROUNDING = 1e-9  # by which a parameter may lie outside of the cube
+_PIECE = 4096  # points evaluated at a time: a bound of the memory
 
 
 def open_uniform_knots(n_control_points: int, degree: int) -> Array:
@@ -234,13 +235,37 @@ def evaluate_at(
     """
     from scipy.interpolate import NdBSpline
 
+    where = checked_parameters(points)
+    spline = NdBSpline(tuple(knots), coefficients, tuple(degrees))
+    return np.asarray(spline(where, nu=tuple(derivative)))
+
+
+def checked_parameters(points: ArrayLike) -> Array:
+    """Return parameters (m, 3) as a float array; raise ValueError for other shapes and numbers outside of 0 to 1."""
     where = np.atleast_2d(np.asarray(points, dtype=np.float64))
     if where.ndim != 2 or where.shape[1] != 3:
         raise ValueError(f"points must have shape (m, 3), got {where.shape}")
     if np.any(outside := ~(np.abs(where - 0.5) <= 0.5 + _ROUNDING).all(axis=1)):  # NaN included
         raise ValueError(f"points are parameters from 0 to 1, got {where[outside][0].tolist()}")
-    spline = NdBSpline(tuple(knots), coefficients, tuple(degrees))
-    return np.asarray(spline(where, nu=tuple(derivative)))
+    return where
+
+
+def evaluate_each(
+    degrees: Sequence[int], knots: Sequence[Array], coefficients: Array, members: IntArray, points: ArrayLike
+) -> Array:
+    """Evaluate trivariate splines on the same knots at points (m, 3), each in the spline of one of the members (m,).
+
+    coefficients: (k, n_u, n_v, n_w, c); returns (m, c). Raises ValueError as `evaluate_at`.
+    """
+    where = checked_parameters(points)
+    found = np.empty((len(where), coefficients.shape[4]))
+    for part in (slice(begin, begin + _PIECE) for begin in range(0, len(where), _PIECE)):
+        rows = [basis_derivatives(row, p, x) for row, p, x in zip(knots, degrees, where[part].T, strict=True)]
+        (i, u), (j, v), (k, w) = ((first[:, None] + np.arange(b.shape[2]), b[0]) for first, b in rows)
+        own = members[part][:, None, None, None]
+        near = coefficients[own, i[:, :, None, None], j[:, None, :, None], k[:, None, None]]
+        found[part] = np.einsum("mi,mj,mk,mijkc->mc", u, v, w, near, optimize=True)
+    return found
 
 
 def evaluate_grid(

@@ -1,12 +1,13 @@
-"""Finds the parameters of points in space: F(u, v, w) = x, or that x lies outside of the volume.
+"""Finds the parameters of points in space: F(u, v, w) = x, or that x lies outside of the body.
 
 Newton's method from the middle of a knot span near the point finds most. The rest is decided by branch and bound: the
 Bezier control points of a span, and of each part that halving gives, form a box in which that part lies (Farouki, "The
 Bernstein polynomial basis: a centennial retrospective", CAGD 29, 2012). Where no box holds a point, it is outside.
-Nets of a rational volume are halved in homogeneous components; with positive weights the box of the control points
-holds the part, too.
+Nets of a rational patch are halved in homogeneous components; with positive weights the box of the control points
+holds the part, too. Patches are searched in groups (patch_groups.py).
 """
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -15,27 +16,29 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial import cKDTree
 
-from ..arrays import Array, IntArray, Knots
+from ..arrays import Array, IntArray, Knots, Mask
 from ..threads import in_parallel
 from .bernstein import extraction
 from .bspline import breakpoints, fill_basis, midpoints, real_array
+from .patch_groups import PatchGroup, groups_of
 from .rational import projected
 from .volume import BSplineVolume
 
 CLOSE = 1e-10  # distance from x, over the diagonal of the box of control points, at which F(u, v, w) counts as x
+_BORDER = 1e-4  # of the parameters: a point so near to a face of its patch may belong to another patch, too
 _STEPS = 20  # of Newton's method, at most
 _HALVINGS = 8  # of a step that does not lead closer, at most
 _EXACT = 1e-15  # distance over the diagonal at which nothing is left to gain
 _LEVELS = 120  # of branch and bound, at most
-_VISITS = 20_000  # parts looked at for a point, at most: a bound for maps that fold
+_VISITS = 20_000  # parts of a patch looked at for a point, at most: a bound for maps that fold
 _PIECE = 4096  # points a task
 
 
-def locate(volume: BSplineVolume, points: ArrayLike) -> Array:
-    """Return the parameters (m, 3) of points (m, 3) in the volume's units; NaN for points outside.
+def locate(patches: Sequence[BSplineVolume], points: ArrayLike) -> tuple[IntArray, Array]:
+    """Return the patches (m,) and parameters (m, 3) of points (m, 3) in the patches' units; -1 and NaN outside.
 
-    A point that is not farther than CLOSE of the diagonal from the volume counts as inside. Of a map that folds, the
-    answer is one of the point's parameters.
+    A point that is not farther than CLOSE of a patch's diagonal from it counts as inside. On an interface the patch
+    that comes first is taken. Where a map folds, the answer is one of the point's places.
     Raises ValueError for points of another shape or that are not finite.
     """
     where = np.atleast_2d(real_array(points, "points"))
@@ -43,26 +46,51 @@ def locate(volume: BSplineVolume, points: ArrayLike) -> Array:
         raise ValueError(f"points must have shape (m, 3), got {np.shape(points)}")
     if not np.all(np.isfinite(where)):
         raise ValueError("points must be finite")
-    return _index(volume).parameters(where)
+    return _index(tuple(patches)).places(where)
 
 
-@lru_cache(maxsize=2)  # a volume is compared by identity, and does not change
-def _index(volume: BSplineVolume) -> "_Index":
-    return _Index.of(volume)
+@lru_cache(maxsize=2)  # volumes are compared by identity, and do not change
+def _index(patches: tuple[BSplineVolume, ...]) -> "_Index":
+    return _Index(groups_of(patches))
+
+
+class _Index:
+    """The patches of a body prepared for the search; the tree holds the middles of the spans of all groups."""
+
+    def __init__(self, groups: Sequence[PatchGroup]) -> None:
+        self.count = sum(map(len, groups))
+        self.groups = list(map(_GroupIndex.of, groups))
+        middles = [_middles(group) for group in groups]
+        self.begins = np.cumsum([0, *map(len, middles)])
+        self.tree = cKDTree(np.concatenate(middles))
+
+    def places(self, points: Array) -> tuple[IntArray, Array]:
+        """Return the patches (m,) and the parameters (m, 3) of points (m, 3), -1 and NaN outside."""
+        owners: IntArray = np.full(len(points), self.count)  # of a point that is not found
+        found = np.full((len(points), 3), np.nan)
+        rows = np.flatnonzero(np.any([group.may_hold(points) for group in self.groups], axis=0))
+        nearest = np.asarray(self.tree.query(points[rows])[1], dtype=np.int64)
+        for group, begin, end in zip(self.groups, self.begins, self.begins[1:], strict=False):
+            own = (nearest >= begin) & (nearest < end)
+            group.improve(points, rows[own], nearest[own] - begin, owners, found)
+        rows = rows[~((found[rows] > _BORDER) & (found[rows] < 1.0 - _BORDER)).all(axis=1)]
+        for group in self.groups:
+            group.search(points, rows[group.may_hold(points[rows])], owners, found)
+        return np.where(owners < self.count, owners, -1), found
 
 
 @dataclass(frozen=True, eq=False)
-class _Index:
-    """A volume prepared for the search.
+class _GroupIndex:
+    """A group of patches prepared for the search. Spans are counted patch after patch, those of w fastest.
 
-    starts (s, 3): the middles of the spans, with their images in the tree. nets: their Bezier control points, as
-    `bezier_nets` returns them, and low and high (s, 3), the boxes of these. ends (s, 2, 3): the spans themselves.
-    Cells of a grid over the whole box list the spans whose boxes reach them: members[first[c] : first[c + 1]] of c.
+    starts (s, 3): the middles of the spans of a patch. nets: the Bezier control points of all spans, as `bezier_nets`
+    returns them, and low and high, (k s, 3), the boxes of these. ends (s, 2, 3): the spans of a patch themselves.
+    diagonals (k,): of the patches' boxes. Cells of a grid over the whole box list the spans whose boxes reach them:
+    members[first[c] : first[c + 1]] of c.
     """
 
-    volume: BSplineVolume
+    group: PatchGroup
     starts: Array
-    tree: cKDTree
     nets: Array
     low: Array
     high: Array
@@ -72,63 +100,92 @@ class _Index:
     counts: IntArray
     first: IntArray
     members: IntArray
-    diagonal: float
+    diagonals: Array
 
     @classmethod
-    def of(cls, volume: BSplineVolume) -> "_Index":
-        u, v, w = (midpoints(row) for row in volume.knots)
-        starts = np.stack(np.meshgrid(u, v, w, indexing="ij"), axis=-1).reshape(-1, 3)
-        nets = bezier_nets(volume)
-        points = nets if volume.weights is None else projected(nets)[0]
+    def of(cls, group: PatchGroup) -> "_GroupIndex":
+        starts = np.stack(np.meshgrid(*map(midpoints, group.knots), indexing="ij"), axis=-1).reshape(-1, 3)
+        nets = bezier_nets(group)
+        points = nets if group.weights is None else projected(nets)[0]
         low, high = points.min(axis=(1, 2, 3)), points.max(axis=(1, 2, 3))
-        corner, size = low.min(axis=0), np.ptp(np.concatenate([low, high]), axis=0)
-        diagonal = float(np.linalg.norm(size))
-        margin = CLOSE * diagonal
-        low, high = low - margin, high + margin
+        each_low, each_high = (side.reshape(len(group), -1, 3) for side in (low, high))
+        diagonals = np.linalg.norm(each_high.max(axis=1) - each_low.min(axis=1), axis=1)
+        margin = CLOSE * diagonals
+        low, high = low - np.repeat(margin, len(starts))[:, None], high + np.repeat(margin, len(starts))[:, None]
+        corner, size = low.min(axis=0), high.max(axis=0) - low.min(axis=0)
         counts = np.full(3, max(1, round(1.5 * len(nets) ** (1 / 3))), dtype=np.int64)
-        cell = (size + 2.0 * margin) / counts
-        corner = corner - margin
+        cell = size / counts
         first, members = _cells(low, high, corner, cell, counts)
-        ends = _ends(volume.knots)
-        tree = cKDTree(volume.grid(u, v, w).reshape(-1, 3))
-        return cls(volume, starts, tree, nets, low, high, ends, corner, cell, counts, first, members, diagonal)
+        ends = _ends(group.knots)
+        return cls(group, starts, nets, low, high, ends, corner, cell, counts, first, members, diagonals)
 
-    def parameters(self, points: Array) -> Array:
-        """Return the parameters (m, 3) of points (m, 3), NaN outside."""
-        within = np.all((points >= self.low.min(axis=0)) & (points <= self.high.max(axis=0)), axis=1)
-        found = np.full((len(points), 3), np.nan)  # points outside of the box are outside of the volume
-        found[within] = self._parameters(points[within])
-        return found
+    def may_hold(self, points: Array) -> Mask:
+        """Return whether points (m, 3) lie in the box of the group."""
+        return np.all((points >= self.low.min(axis=0)) & (points <= self.high.max(axis=0)), axis=1)
 
-    def _parameters(self, points: Array) -> Array:
-        spline = (_padded(self.volume.knots), np.array(self.volume.degrees), _coefficients(self.volume))
-        search = (self.nets, self.low, self.high, self.ends, self.corner, self.cell, self.counts)
+    def improve(self, points: Array, rows: IntArray, spans: IntArray, owners: IntArray, found: Array) -> None:
+        """Write patches (m,) and parameters (m, 3) of those points (m, 3) that Newton's method finds.
+
+        It begins for the points of some rows (k,) in the middle of one of the spans each, (k,).
+        """
+        places, begin = np.divmod(spans, len(self.starts))
 
         def task(part: slice) -> Array:
-            begin = self.starts[self.tree.query(points[part])[1]]
-            return _located(points[part], begin, *spline, *search, self.first, self.members, self.diagonal)
+            nearest = self.starts[begin[part]]
+            return _improved(points[rows[part]], places[part], nearest, *self._spline, *self._grid)
 
-        parts = [slice(i, i + _PIECE) for i in range(0, len(points), _PIECE)]
-        return np.concatenate(in_parallel(task, parts)) if parts else np.empty((0, 3))
+        found[rows] = _in_pieces(task, len(rows), 3)
+        reached = np.isfinite(found[rows, 0])
+        owners[rows[reached]] = self.group.numbers[places[reached]]
+
+    def search(self, points: Array, rows: IntArray, owners: IntArray, found: Array) -> None:
+        """Write patches (m,) and parameters (m, 3) of points of some rows (k,) that lie in a patch before their own."""
+        spans = self.nets, self.low, self.high, self.ends
+
+        def task(part: slice) -> Array:
+            own = rows[part]
+            return _searched(points[own], owners[own], self.group.numbers, *self._spline, *self._grid, *spans)
+
+        answers = _in_pieces(task, len(rows), 4)
+        better = np.isfinite(answers[:, 0])
+        owners[rows[better]] = answers[better, 3].astype(np.int64)
+        found[rows[better]] = answers[better, :3]
+
+    @property
+    def _spline(self) -> tuple[Array, IntArray, Array, Array]:
+        group = self.group
+        return _padded(group.knots), np.array(group.degrees), np.ascontiguousarray(group.coefficients), self.diagonals
+
+    @property
+    def _grid(self) -> tuple[Array, Array, IntArray, IntArray, IntArray]:
+        return self.corner, self.cell, self.counts, self.first, self.members
 
 
-def bezier_nets(volume: BSplineVolume) -> Array:
+def _in_pieces(task: Callable[[slice], Array], count: int, columns: int) -> Array:
+    """Return the rows (count, columns) that a task returns for each piece of them."""
+    parts = [slice(i, i + _PIECE) for i in range(0, count, _PIECE)]
+    return np.concatenate([np.empty((0, columns)), *in_parallel(task, parts)])
+
+
+def _middles(group: PatchGroup) -> Array:
+    """Return the middles (s, 3) of all spans in space, in the order of `bezier_nets`."""
+    u, v, w = map(midpoints, group.knots)
+    return group.grid(u, v, w).reshape(-1, 3)
+
+
+def bezier_nets(group: PatchGroup) -> Array:
     """Return the Bezier control points (s, p_u + 1, p_v + 1, p_w + 1, 3) of all spans, those of w fastest.
 
-    Of a rational volume they are homogeneous, (.., 4).
+    They come patch after patch. Of rational patches they are homogeneous, (.., 4).
     """
-    net = _coefficients(volume)
-    for axis, (knots, degree) in enumerate(zip(volume.knots, volume.degrees, strict=True)):
+    net = group.coefficients
+    for axis, (knots, degree) in enumerate(zip(group.knots, group.degrees, strict=True)):
         first, weights = extraction(knots, degree)
-        windows = np.moveaxis(net, 2 * axis, 0)[first[:, None] + np.arange(degree + 1)]
-        net = np.moveaxis(np.einsum("sjk,sk...->sj...", weights, windows), (0, 1), (2 * axis, 2 * axis + 1))
-    s_u, n_u, s_v, n_v, s_w, n_w, c = net.shape
-    return np.ascontiguousarray(net.transpose(0, 2, 4, 1, 3, 5, 6)).reshape(s_u * s_v * s_w, n_u, n_v, n_w, c)
-
-
-def _coefficients(volume: BSplineVolume) -> Array:
-    """Return the control points (n_u, n_v, n_w, 3), of a rational volume homogeneous, (.., 4)."""
-    return np.ascontiguousarray(volume.control_points if volume.weights is None else volume.homogeneous)
+        place = 2 * axis + 1
+        windows = np.moveaxis(net, place, 0)[first[:, None] + np.arange(degree + 1)]
+        net = np.moveaxis(np.einsum("sjk,sk...->sj...", weights, windows), (0, 1), (place, place + 1))
+    net = np.ascontiguousarray(net.transpose(0, 1, 3, 5, 2, 4, 6, 7))
+    return net.reshape(-1, *net.shape[4:])
 
 
 def _padded(knots: Knots) -> Array:
@@ -174,59 +231,96 @@ def _cells(low: Array, high: Array, corner: Array, cell: Array, counts: IntArray
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def _located(
+def _improved(
     points: Array,
+    places: IntArray,
     begin: Array,
     knots: Array,
     degrees: IntArray,
     control: Array,
-    nets: Array,
-    low: Array,
-    high: Array,
-    ends: Array,
+    diagonals: Array,
     corner: Array,
     cell: Array,
     counts: IntArray,
     first: IntArray,
     members: IntArray,
-    diagonal: float,
 ) -> Array:
-    """Return the parameters (m, 3) of points (m, 3), NaN outside; `begin` (m, 3) are where Newton's method starts."""
+    """Return the parameters (m, 3) of points (m, 3) in patches at places (m,), NaN where Newton's method fails.
+
+    It begins at parameters (m, 3).
+    """
     found = np.full((len(points), 3), np.nan)
+    basis = np.empty((3, 2, 1, degrees.max() + 1))
+    for m in range(len(points)):
+        if len(_near(points[m], corner, cell, counts, first, members)):
+            k = places[m]
+            _newton(points[m], begin[m], knots, degrees, control[k], basis, diagonals[k], found[m])
+    return found
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _near(point: Array, corner: Array, cell: Array, counts: IntArray, first: IntArray, members: IntArray) -> IntArray:
+    """Return the spans whose boxes reach the cell of a point, ascending; none outside of all cells."""
+    c = 0
+    for d in range(3):
+        place = int(np.floor((point[d] - corner[d]) / cell[d]))
+        if not 0 <= place < counts[d]:
+            return members[:0]
+        c = c * counts[d] + place
+    return members[first[c] : first[c + 1]]
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _searched(
+    points: Array,
+    limits: IntArray,
+    numbers: IntArray,
+    knots: Array,
+    degrees: IntArray,
+    control: Array,
+    diagonals: Array,
+    corner: Array,
+    cell: Array,
+    counts: IntArray,
+    first: IntArray,
+    members: IntArray,
+    nets: Array,
+    low: Array,
+    high: Array,
+    ends: Array,
+) -> Array:
+    """Return parameters and patch (m, 4) of points (m, 3) in a patch with a number below limits (m,), NaN elsewhere.
+
+    numbers: (k,) of the group's patches, ascending. The first patch that holds a point is taken.
+    """
+    found = np.full((len(points), 4), np.nan)
     basis = np.empty((3, 2, 1, degrees.max() + 1))
     stack = np.empty((_LEVELS + 2, *nets.shape[1:]))
     boxes = np.empty((_LEVELS + 2, 2, 3))
     levels = np.empty(_LEVELS + 2, dtype=np.int64)
     for m in range(len(points)):
-        place = np.empty(3, dtype=np.int64)
-        inside = True
-        for d in range(3):
-            place[d] = int(np.floor((points[m, d] - corner[d]) / cell[d]))
-            inside = inside and 0 <= place[d] < counts[d]
-        if not inside:
-            continue
-        c = (place[0] * counts[1] + place[1]) * counts[2] + place[2]
-        if first[c] == first[c + 1]:
-            continue
-        if _newton(points[m], begin[m], knots, degrees, control, basis, diagonal, found[m]):
-            continue
-        visits = 0
-        for s in members[first[c] : first[c + 1]]:
+        patch, visits = -1, 0
+        for s in _near(points[m], corner, cell, counts, first, members):
+            if s // len(ends) != patch:
+                patch, visits = s // len(ends), 0
+            if numbers[patch] >= limits[m]:
+                break
             if not _holds(low[s], high[s], points[m]):
                 continue
-            stack[0], boxes[0], levels[0] = nets[s], ends[s], 0
-            size = 1
+            stack[0], boxes[0], levels[0] = nets[s], ends[s % len(ends)], 0
+            size, margin = 1, CLOSE * diagonals[patch]
             while size and visits < _VISITS:
                 size -= 1
                 visits += 1
                 if levels[size] % 3 == 0:
                     middle = 0.5 * (boxes[size, 0] + boxes[size, 1])
-                    if _newton(points[m], middle, knots, degrees, control, basis, diagonal, found[m]):
-                        visits = _VISITS
+                    net, answer = control[patch], found[m, :3]
+                    if _newton(points[m], middle, knots, degrees, net, basis, diagonals[patch], answer):
+                        found[m, 3] = numbers[patch]
                         break
                 if levels[size] < _LEVELS:
-                    size = _halve(points[m], stack, boxes, levels, size, CLOSE * diagonal)
-            if visits >= _VISITS:
+                    size = _halve(points[m], stack, boxes, levels, size, margin)
+            if not np.isnan(found[m, 3]):
                 break
     return found
 

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays import Array, IntArray, Knots
-from .bspline import evaluate_grid
-from .rational import Orders, homogeneous, quotients
+from .bspline import evaluate_each, evaluate_grid
+from .rational import Orders, homogeneous, projected, quotients
 from .volume import UNITS, BSplineVolume
 
 
@@ -64,6 +64,11 @@ class PatchGroup:
         """Return the homogeneous coefficients (k, n_u, n_v, n_w, 4); weights are 1 where there are none."""
         ones = np.ones(self.control_points.shape[:4])
         return homogeneous(self.control_points, ones if self.weights is None else self.weights)
+
+    def at(self, places: IntArray, parameters: ArrayLike) -> Array:
+        """Return F (m, 3) at parameters (m, 3) of the patches at places (m,) of the group."""
+        values = evaluate_each(self.degrees, self.knots, self.coefficients, places, parameters)
+        return values if self.weights is None else projected(values)[0]
 
     def grid(self, u: ArrayLike, v: ArrayLike, w: ArrayLike, derivative: Orders = (0, 0, 0)) -> Array:
         """Return F or one of its partial derivatives on a tensor grid: (k, len(u), len(v), len(w), 3)."""

@@ -211,7 +211,7 @@ class BSplineVolume(Brief, Shown):
         """
         from .location import locate
 
-        return locate(self, points)
+        return locate((self,), points)[1]
 
     def jacobian(self, points: ArrayLike) -> Array:
         """Return J[i, a, b] = dF_a / du_b at points (m, 3): (m, 3, 3)."""
