@@ -1,5 +1,6 @@
 """Assembles the operator and the load of a problem, with the data on faces and regions."""
 
+from collections import defaultdict
 from collections.abc import Hashable, Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple, Protocol
@@ -9,7 +10,7 @@ import numpy as np
 from parameterize.arrays import Array
 from parameterize.spline.volume import FACE_NAMES, BSplineVolume
 
-from .discretization.face_data import FaceRule, boundary_coefficients, face_rule, has_face
+from .discretization.face_data import FaceRule, coefficients_of_patches, face_rule, has_face
 from .discretization.grouped import BodyMatrix, Law, assemble_body
 from .discretization.groups import Layout, OnPatches
 from .discretization.on_regions import weak_faces
@@ -73,16 +74,32 @@ def assemble_body_data(patches: Sequence[Stated], options: SolveOptions, shift: 
     layout = Layout.of([patch.space for patch in patches])
     matrix, loads = assemble_body(layout, laws, options.thread_count)
     known = layout.empty(loads.components)
+    _give_values(patches, known)
     terms: list[dict[str, Any]] = []
-    for patch, load, given in zip(patches, loads, known, strict=True):
+    for patch, load in zip(patches, loads, strict=True):
         volume, problem, space = patch.volume, patch.problem, patch.space
         with space.agreed():
             on_boundary = _on_regions if problem.conditions else _on_faces
             terms.append(on_boundary(volume, problem, space, load))
-        if space.dirichlet:
-            whole = boundary_coefficients(volume, space.whole, problem.boundary_at, loads.components)
-            given[:] = whole[:, space.rows]
     return Assembled(matrix.with_faces(terms), loads, known)
+
+
+def _give_values(patches: Sequence[Stated], known: Sequence[Array]) -> None:
+    """Write the fixed coefficients of each patch; those of patches with equal knots and data are found at once."""
+    groups = defaultdict(list)
+    for number, patch in enumerate(patches):
+        volume, whole = patch.volume, patch.space.whole
+        if whole.dirichlet:
+            knots = (row.tobytes() for row in (*volume.knots, *whole.knots))
+            data = patch.problem.on_boundary if len(patches) > 1 else None
+            groups[volume.degrees, volume.weights is None, whole.degrees, *knots, data].append(number)
+    for numbers in groups.values():
+        own = [patches[number] for number in numbers]
+        boundary_at, whole = own[0].problem.boundary_at, own[0].space.whole
+        volumes, components = [patch.volume for patch in own], len(known[0])
+        found = coefficients_of_patches(volumes, whole, boundary_at, components)
+        for number, patch, values in zip(numbers, own, found, strict=True):
+            known[number][:] = values[:, patch.space.rows]
 
 
 def _check_laws(patches: Sequence[Stated]) -> bool:

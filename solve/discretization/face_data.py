@@ -1,6 +1,6 @@
 """Discretizes data on the images of the cube's faces: Dirichlet values projected, Neumann and Robin data integrated."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import product
 
@@ -8,7 +8,7 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from parameterize.arrays import Array
-from parameterize.spline.bspline import apply_along, collocation
+from parameterize.spline.bspline import apply_along, collocation, evaluate_grid
 from parameterize.spline.interface import axis_side
 from parameterize.spline.volume import FACE_NAMES, BSplineVolume
 
@@ -19,17 +19,25 @@ from .space import TrialSpace
 
 FREE = None
 
+Values = Callable[[Array, str], Array]
 
-def boundary_coefficients(
-    volume: BSplineVolume, space: TrialSpace, values: Callable[[Array, str], Array], components: int = 1
+
+def boundary_coefficients(volume: BSplineVolume, space: TrialSpace, values: Values, components: int = 1) -> Array:
+    """Return the coefficients (c, n_u, n_v, n_w) of `coefficients_of_patches` for one patch."""
+    return coefficients_of_patches([volume], space, values, components)[0]
+
+
+def coefficients_of_patches(
+    volumes: Sequence[BSplineVolume], space: TrialSpace, values: Values, components: int = 1
 ) -> Array:
-    """Return coefficients (c, n_u, n_v, n_w) of an approximation of Dirichlet data on their faces, zero elsewhere.
+    """Return coefficients (k, c, n_u, n_v, n_w) of an approximation of Dirichlet data on their faces, zero elsewhere.
 
-    values: a function of points (3, ...) and the name of their face that returns (c, ...), one row a component. Corners
-    are interpolated, then edges and faces are projected in L2, in the parametric measure; an edge or a face keeps the
-    coefficients on its ends or its rim.
+    volumes: k patches of equal degrees and knots. space: the trial space of all of them. values: a function of points
+    (3, ...) and the name of their face that returns (c, ...), one row a component. Corners are interpolated, then edges
+    and faces are projected in L2, in the parametric measure; an edge or a face keeps the coefficients on its ends or
+    its rim.
     """
-    coefficients = np.zeros((components, *space.shape))
+    coefficients = np.zeros((components, *space.shape, len(volumes)))
     points, bases, projections = zip(*map(_projection, space.knots, space.degrees), strict=True)
     for entity in sorted(product((0, 1, FREE), repeat=3), key=lambda entity: entity.count(FREE)):
         of = [FACE_NAMES[2 * axis + side] for axis, side in enumerate(entity) if side is not FREE]
@@ -37,17 +45,28 @@ def boundary_coefficients(
         if not given:
             continue
         free = [a for a in range(3) if entity[a] is FREE]
-        u, v, w = (points[a] if side is FREE else np.array([float(side)]) for a, side in enumerate(entity))
+        rows = [points[a] if side is FREE else np.array([float(side)]) for a, side in enumerate(entity)]
         ends = [slice(None) if side is FREE else slice(-side, 1 - side or None) for side in entity]
         inside = [slice(1, -1) if side is FREE else end for side, end in zip(entity, ends, strict=True)]
         fixed = coefficients[:, *ends]  # on the closed entity: its own ends are known already
         for a in free:
             fixed = apply_along(bases[a], fixed, a + 1)
-        residual = values(Points.on(volume, u, v, w), given[0]) - fixed
+        residual = values(_on_grid(volumes, rows), given[0]).reshape(fixed.shape) - fixed
         for a in free:
             residual = np.moveaxis(np.tensordot(projections[a], residual, (1, a + 1)), 0, a + 1)
         coefficients[:, *inside] = residual
-    return coefficients
+    return np.moveaxis(coefficients, -1, 0)
+
+
+def _on_grid(volumes: Sequence[BSplineVolume], rows: Sequence[Array]) -> Array:
+    """Return the points (3, .., k) of volumes of equal degrees and knots on a grid; (3, ..), with rows, of one."""
+    first, u, v, w = volumes[0], *rows
+    if len(volumes) == 1:
+        return Points.on(first, u, v, w)
+    is_rational = first.weights is not None
+    nets = np.stack([volume.homogeneous if is_rational else volume.control_points for volume in volumes], axis=3)
+    found = np.moveaxis(evaluate_grid(first.degrees, first.knots, nets, (u, v, w)), -1, 0)
+    return found[:3] / found[3:] if is_rational else found
 
 
 def _projection(knots: Array, degree: int) -> tuple[Array, csr_array, Array]:

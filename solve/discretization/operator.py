@@ -5,6 +5,7 @@ on planes of points: gradients are pulled back, the law turns them into fluxes, 
 """
 
 import math
+from collections import defaultdict
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -115,17 +116,31 @@ class Operator(MatrixFree):
 
         For a slab it is the diagonal of the integrals over its spans.
         """
-        result = self.stack.diagonals(self.factors[None])[0]
-        on_faces = np.zeros(self.space.shape)
-        for face in self.faces.values():
-            face.add_diagonal(self.component, on_faces)
-        return result + on_faces
+        return diagonals([self])[0]
 
     def dense(self, axis: int, derivative: int) -> Array:
         """Return the matrix (q, n) of a direction's functions, or of their derivatives, at its points."""
         knots, degree = self.space.knots[axis], self.space.degrees[axis]
         matrix: Array = collocation(knots, degree, self.rule.points[axis], derivative).toarray()
         return matrix
+
+
+def diagonals(operators: Sequence[Operator]) -> list[Array]:
+    """Return the diagonal (n_u, n_v, n_w) of each operator; operators of one shape are passed at once."""
+    shapes = defaultdict(list)
+    for number, operator in enumerate(operators):
+        shapes[operator.space.degrees, operator.space.shape, operator.factors.shape].append(number)
+    found: list[Any] = [None] * len(operators)
+    for numbers in shapes.values():
+        own = [operators[number] for number in numbers]
+        stack = Stack([one.space for one in own], [one.rule for one in own], own[0].threads, runs=(0, len(own)))
+        factors = own[0].factors[None] if len(own) == 1 else np.stack([one.factors for one in own])
+        for number, operator, result in zip(numbers, own, stack.diagonals(factors), strict=True):
+            on_faces = np.zeros(result.shape)
+            for face in operator.faces.values():
+                face.add_diagonal(operator.component, on_faces)
+            found[number] = result + on_faces if operator.faces else result
+    return found
 
 
 @dataclass(frozen=True, eq=False)

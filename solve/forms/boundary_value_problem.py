@@ -172,6 +172,14 @@ class BoundaryValueProblem:
         return tuple((role, datum.entries) for role, datum in self.data.items())
 
     @property
+    def on_boundary(self) -> Hashable:
+        """Return what the values on faces are made of: the same for patches where they are the same."""
+        strong = {face: self.strong_on(face) for face in self.dirichlet}
+        given = ((face, one and one.datum and one.datum.entries) for face, one in strong.items())
+        exact = self.data.get("exact")
+        return tuple(sorted(given, key=lambda one: one[0])), exact and exact.entries
+
+    @property
     def loads(self) -> list[str]:
         """Return the names of the source and of the fluxes that are given, without those that are zero."""
         acting = (one.datum for one in self._all if not one.is_support)

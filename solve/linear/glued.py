@@ -16,7 +16,7 @@ from parameterize.spline.body import shared_numbers
 from parameterize.spline.bspline import greville
 from parameterize.spline.interface import Interface, face_layer
 
-from ..discretization.operator import Operator
+from ..discretization.operator import Operator, diagonals
 from ..discretization.space import TrialSpace
 from ..discretization.unknowns import Glued
 from .preconditioner import FastDiagonalization
@@ -113,11 +113,10 @@ def shares_of(unknowns: Glued, operators: Sequence[Operator]) -> tuple[Array, ..
     An interface between two materials then belongs to the stiffer patch. On a plate of 8 patches, whose conductivities
     are 1 and 10 000 by turns, that takes 18 iterations, with equal shares 107.
     """
-    diagonals = [np.abs(operator.diagonal())[None] for operator in operators]
-    sums = unknowns.spread(unknowns.collect(diagonals))
+    sizes = [np.abs(diagonal)[None] for diagonal in diagonals(operators)]
+    sums = unknowns.spread(unknowns.collect(sizes))
     return tuple(
-        np.divide(own, total, out=np.zeros_like(own), where=total > 0.0)
-        for own, total in zip(diagonals, sums, strict=True)
+        np.divide(own, total, out=np.zeros_like(own), where=total > 0.0) for own, total in zip(sizes, sums, strict=True)
     )
 
 
