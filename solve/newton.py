@@ -28,7 +28,6 @@ from .forms.boundary_value_problem import BoundaryValueProblem
 from .forms.form import Form
 from .forms.problem import Problem
 from .linear.krylov import generalized_residuals
-from .linear.preconditioner import blocks_of
 from .options import SolveOptions
 from .patch_system import PatchProblem, scalar_operators
 from .solution import Solution, SolveReport
@@ -173,7 +172,7 @@ class _Balance:
             on_regions += [face for face in operator.faces.values() if isinstance(face, WeakFace)]
         demand_area(problem, on_regions, patches[0].space, body.patches)
         for part in body.parts if len(body.parts) > 1 and not problem.form.has_reaction else ():
-            demand_fixed(part, [block for number in part for block in blocks_of(operators[number])])
+            demand_fixed(part, [own for number in part for own in operators[number]])
         unknowns = unknowns_of([patch.space for patch in patches], body.interfaces)
         free = unknowns.spread(np.ones((len(loads[0]), *unknowns.shape)))
         known, fixed = unknowns.completed(known), [part == 0.0 for part in free]
@@ -227,8 +226,7 @@ class _Balance:
         """Return the solution of a linear system, by GMRES where the matrix is not definite."""
         components = range(len(right))
         operators = [[tangent.block(i) for i in components] for tangent in tangents]
-        blocks = [blocks_of(own) for own in operators]
-        inverses = preconditioners(self.unknowns, blocks, operators, self.body.interfaces)
+        inverses = preconditioners(self.unknowns, operators, self.body.interfaces)
 
         def product(x: Array) -> Array:
             spread = zip(tangents, self.unknowns.spread(x), strict=True)

@@ -13,7 +13,6 @@ from .discretization.operator import FormOperator, Operator
 from .discretization.space import TrialSpace
 from .discretization.weak import WeakFace
 from .forms.boundary_value_problem import BoundaryValueProblem
-from .linear.preconditioner import FastDiagonalization, blocks_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,15 +30,13 @@ class PatchSystem(PatchProblem):
 
     matrix: the products with all coefficients (c, n_u, n_v, n_w) of the patch. known: the coefficients that Dirichlet
     data fix, zero elsewhere. loads: of all coefficients, before the known ones are subtracted. operators: the scalar
-    operator of each component, a single one where it serves all. blocks: their preconditioners, natural on faces that
-    are glued; None for a patch without unknowns.
+    operator of each component, a single one where it serves all.
     """
 
     matrix: Operator | FormOperator
     known: Array
     loads: Array
     operators: tuple[Operator, ...]
-    blocks: tuple[FastDiagonalization | None, ...]
 
     @property
     def weak(self) -> list[WeakFace]:
@@ -66,7 +63,6 @@ def systems_of(patches: Sequence[PatchProblem], found: Assembled) -> tuple[Patch
             known=known,
             loads=loads,
             operators=operators,
-            blocks=blocks_of(operators),
         )
         for patch, own, loads, known, operators in rows
     )

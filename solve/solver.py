@@ -1,6 +1,7 @@
 """Solves any problem: checks it, discretizes it, and solves the linear system."""
 
 import functools
+from collections import defaultdict
 from dataclasses import replace
 from typing import Any
 
@@ -171,12 +172,13 @@ def _on_patches(
     if not body.is_single and options.comm is not None and options.comm.size > 1:
         raise ValueError("a body of several patches is solved by one process: leave comm out")
     _demand_known_patches(body, problem)
-    placed, patches = problem.on(body), []
+    placed, patches, rings = problem.on(body), [], defaultdict(list)
+    for interface in body.interfaces:
+        if interface.ring is not None:
+            rings[interface.first[0]].append(interface.ring)
     for i, (volume, own) in enumerate(zip(body, placed.on_patches(body), strict=True)):
         space = trial_space(volume, options.refine, options.degree, own.dirichlet, body.outer[i])
-        own_ways = (interface.ring for interface in body.interfaces if interface.first[0] == i)
-        rings = tuple(way for way in own_ways if way is not None)
-        patches.append(PatchProblem(volume, own, replace(space, periodic=rings)))
+        patches.append(PatchProblem(volume, own, replace(space, periodic=tuple(rings[i]))))
     return placed, patches
 
 

@@ -30,9 +30,9 @@ from .discretization.unknowns import Glued, Unknowns, unknowns_of
 from .field import BodyField, FieldOnBody, SplineField
 from .forms.boundary_value_problem import BoundaryValueProblem
 from .forms.mass import Mass
-from .linear.glued import Coarse, GluedPreconditioner, shares_of
+from .linear.glued import GluedPreconditioner
 from .linear.krylov import generalized_residuals
-from .linear.preconditioner import FastDiagonalization
+from .linear.preconditioner import FastDiagonalization, fast_diagonalization, leaves_constants
 from .options import IterationOptions, SolveOptions, check_device
 from .patch_system import PatchProblem, PatchSystem, systems_of
 from .reactions import balance
@@ -368,8 +368,7 @@ def build(
         known = matrix.layout.joined(unknowns.completed(found.known))
         systems = systems_of(patches, found._replace(known=known))
         _demand_held(body, problem, systems, is_loose)
-        parts = [system.blocks for system in systems], [system.operators for system in systems]
-        blocks = preconditioners(unknowns, *parts, body.interfaces)
+        blocks = preconditioners(unknowns, [system.operators for system in systems], body.interfaces)
         if blocks[0].singular and not is_loose and isinstance(systems[0].matrix, FormOperator):
             raise ValueError(
                 f"{type(problem.form).__name__} without a reaction, and with Neumann data on all faces, does not "
@@ -398,29 +397,20 @@ def _demand_held(body: Body, problem: BoundaryValueProblem, systems: Sequence[Pa
         except ValueError as error:
             raise ValueError(f"{named}: {error}" if len(parts) > 1 else str(error)) from None
         if len(parts) > 1:
-            demand_fixed(numbers, [block for system in part for block in system.blocks])
+            demand_fixed(numbers, [operator for system in part for operator in system.operators])
 
 
-def demand_fixed(part: Sequence[int], blocks: Sequence[FastDiagonalization | None]) -> None:
-    """Raise ValueError where the blocks of a part of a body, patches by their numbers, leave a constant free."""
-    if all(block is not None and block.singular for block in blocks):
+def demand_fixed(part: Sequence[int], operators: Sequence[Operator]) -> None:
+    """Raise ValueError where the operators of a part of a body, patches by their numbers, leave a constant free."""
+    if all(leaves_constants(operator) for operator in operators):
         named = ", ".join(f"p{number}" for number in part)
         raise ValueError(f"nothing fixes the solution on {named}, a part of its own: give it a value, or glue it")
 
 
 def preconditioners(
-    unknowns: Unknowns,
-    blocks: Sequence[Sequence[FastDiagonalization | None]],
-    operators: Sequence[Sequence[Operator]],
-    interfaces: Sequence[Interface],
+    unknowns: Unknowns, operators: Sequence[Sequence[Operator]], interfaces: Sequence[Interface]
 ) -> tuple[Preconditioner, ...]:
-    """Return the preconditioner of each component from the blocks and the scalar operators of each patch."""
+    """Return the preconditioner of each component from the scalar operators of each patch."""
     if not isinstance(unknowns, Glued):
-        return tuple(block for block in blocks[0] if block is not None)
-    found = []
-    for of_component, scalar in zip(zip(*blocks, strict=True), zip(*operators, strict=True), strict=True):
-        is_open = all(block is not None and block.singular for block in of_component)
-        held = tuple(block and block.held() for block in of_component)
-        weights, coarse = shares_of(unknowns, scalar), Coarse.of(unknowns, scalar, interfaces)
-        found.append(GluedPreconditioner(unknowns, weights, held, coarse, is_open))
-    return tuple(found)
+        return tuple(map(fast_diagonalization, operators[0]))
+    return tuple(GluedPreconditioner.of(unknowns, own, interfaces) for own in zip(*operators, strict=True))

@@ -115,7 +115,7 @@ def test_a_preconditioner_without_finite_numbers_is_never_a_solution(monkeypatch
         found = fast_diagonalization(operator)
         return replace(found, inverse=np.nan * found.inverse)
 
-    monkeypatch.setattr("solve.linear.preconditioner.fast_diagonalization", broken)
+    monkeypatch.setattr("solve.system.fast_diagonalization", broken)
     for problem in (Poisson(source="1", boundary="0"), Elasticity(body_force=("0", "0", "-1"))):
         with pytest.raises(
             ConvergenceError, match="after 0 iterations the preconditioner does not give finite"

@@ -122,8 +122,10 @@ class FaceRule:
 
 def has_face(space: TrialSpace, name: str) -> bool:
     """Return whether the face `name`, one of FACE_NAMES, is outer, and this process integrates over a part of it."""
+    if name not in space.outer:
+        return False
     u = space.breaks[0]
-    return name in space.outer and len(u) > 1 and (name[0] != "u" or u[-int(name[1])] == float(name[1]))
+    return len(u) > 1 and (name[0] != "u" or bool(u[-int(name[1])] == float(name[1])))
 
 
 def face_rule(volume: BSplineVolume, space: TrialSpace, name: str) -> FaceRule:

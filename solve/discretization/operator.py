@@ -6,7 +6,7 @@ on planes of points: gradients are pulled back, the law turns them into fluxes, 
 
 import math
 from collections import defaultdict
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, Protocol
@@ -127,20 +127,44 @@ class Operator(MatrixFree):
 
 def diagonals(operators: Sequence[Operator]) -> list[Array]:
     """Return the diagonal (n_u, n_v, n_w) of each operator; operators of one shape are passed at once."""
+    found: list[Any] = [None] * len(operators)
+    for numbers, stack, factors in _stacks(operators):
+        for number, result in zip(numbers, stack.diagonals(factors), strict=True):
+            on_faces = np.zeros(result.shape)
+            for face in operators[number].faces.values():
+                face.add_diagonal(operators[number].component, on_faces)
+            found[number] = result + on_faces if operators[number].faces else result
+    return found
+
+
+def products(operators: Sequence[Operator], coefficients: Array) -> Array:
+    """Return the products (k, c, n_u n_v n_w) of operators and the same coefficients (c, n_u, n_v, n_w), without faces.
+
+    The spaces of all operators have one shape.
+    """
+    found = np.zeros((len(operators), len(coefficients), math.prod(coefficients.shape[1:])))
+    for numbers, stack, factors in _stacks(operators):
+        source, result = np.stack([coefficients] * len(numbers)), np.zeros((len(numbers), *coefficients.shape))
+        places = np.arange(len(numbers))
+
+        def multiply(piece: Piece) -> None:
+            where = places, *piece, stack.kinds, stack.tables, factors  # noqa: B023  # called in this turn of the loop
+            group_kernels.multiply_patches(source, *where, result)  # noqa: B023
+
+        stack.on_pieces(multiply)
+        found[numbers] = result.reshape(len(numbers), len(coefficients), -1)
+    return found
+
+
+def _stacks(operators: Sequence[Operator]) -> Iterator[tuple[list[int], Stack, Array]]:
+    """Yield the numbers of the operators of one shape, their stack, and their factors (k, q_u, 6 or 7, q_w, q_v)."""
     shapes = defaultdict(list)
     for number, operator in enumerate(operators):
         shapes[operator.space.degrees, operator.space.shape, operator.factors.shape].append(number)
-    found: list[Any] = [None] * len(operators)
     for numbers in shapes.values():
         own = [operators[number] for number in numbers]
         stack = Stack([one.space for one in own], [one.rule for one in own], own[0].threads, runs=(0, len(own)))
-        factors = own[0].factors[None] if len(own) == 1 else np.stack([one.factors for one in own])
-        for number, operator, result in zip(numbers, own, stack.diagonals(factors), strict=True):
-            on_faces = np.zeros(result.shape)
-            for face in operator.faces.values():
-                face.add_diagonal(operator.component, on_faces)
-            found[number] = result + on_faces if operator.faces else result
-    return found
+        yield numbers, stack, own[0].factors[None] if len(own) == 1 else np.stack([one.factors for one in own])
 
 
 @dataclass(frozen=True, eq=False)

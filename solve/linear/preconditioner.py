@@ -7,7 +7,7 @@ reaction and Robin's conditions are included.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -140,10 +140,10 @@ def fast_diagonalization(operator: Operator) -> FastDiagonalization:
         return whole if whole.local is not None and _is_usable(whole) else replace(found, weakness=NO_FACTOR)
 
 
-def blocks_of(operators: Sequence[Operator]) -> tuple[FastDiagonalization | None, ...]:
-    """Return the preconditioner of each component of a patch; None for a patch without unknowns."""
-    has_unknowns = all(part.stop > part.start for part in operators[0].space.free)
-    return tuple(fast_diagonalization(operator) if has_unknowns else None for operator in operators)
+def leaves_constants(operator: Operator) -> bool:
+    """Return whether constants are in an operator's kernel: no Dirichlet face, no reaction, no term on faces."""
+    stiff = (face.stiffness(operator.component) for face in operator.faces.values())
+    return not operator.space.dirichlet and not operator.factors[:, 6:].any() and not any(stiff)
 
 
 def _is_usable(preconditioner: FastDiagonalization) -> bool:
@@ -255,8 +255,14 @@ def _scaling(operator: Operator, diagonal: Array | float) -> Array:
         both = np.moveaxis(found, axis, 0)
         both[0] += both[-1]
         both[-1] = both[0]
-    wanted = found[operator.space.window]
-    # A folded map has diagonal entries below zero; their size is all a scaling can use.
+    return scaling_of(diagonal, found[operator.space.window])
+
+
+def scaling_of(diagonal: Array | float, wanted: Array) -> Array:
+    """Return the square root of a diagonal over a wanted one, zero where the wanted one is zero.
+
+    A folded map has diagonal entries below zero; their size is all a scaling can use.
+    """
     return np.sqrt(np.abs(np.divide(diagonal, wanted, out=np.zeros(wanted.shape), where=wanted != 0.0)))
 
 
