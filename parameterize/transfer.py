@@ -26,7 +26,7 @@ def transferred(boundary: BoundaryMap, body: Body, surface: Surface) -> Boundary
         return BoundaryMap(surface.vertices, places, faces, part_faces=faces, groups=groups, patches=patches)
     mesh = boundary.vertices, boundary.faces, boundary.parameters, boundary.cube_faces
     _, places, axis = places_near(surface.vertices, *mesh)
-    parameters, _ = closest_in_faces(surface.vertices, body.only, places, axis)
+    parameters, _ = closest_in_faces(surface.vertices, body, np.zeros(len(places), dtype=np.int64), places, axis)
     return BoundaryMap(
         np.concatenate([surface.vertices, boundary.vertices]),
         np.concatenate([parameters, boundary.parameters]),

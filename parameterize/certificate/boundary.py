@@ -6,7 +6,6 @@ settled by a proof (patch_proofs.py), or cut in four and looked at again. Where 
 point are searched for.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -158,13 +157,13 @@ def _search(local: Body, pieces: Pieces, pairs: IntArray, error: float) -> tuple
     patches = [pieces.patches[part] for part in chosen.T]
     where = [_middles(local, pieces, part) for part in chosen.T]  # two (k, 3)
     for _ in range(_NEWTON_STEPS):
-        gap = _at(local, patches[0], where[0]) - _at(local, patches[1], where[1])
+        gap = local.points(patches[0], where[0]) - local.points(patches[1], where[1])
         slopes = _slopes(local, patches, where, tangents)
         step = np.einsum("kab,kb->ka", np.linalg.pinv(slopes, rcond=1e-9), gap)  # (k, 4)
         for side in range(2):
             where[side][rows, tangents[side]] -= step[:, 2 * side : 2 * side + 2]
             np.clip(where[side], 0.0, 1.0, out=where[side])
-    gap = np.linalg.norm(_at(local, patches[0], where[0]) - _at(local, patches[1], where[1]), axis=1)
+    gap = np.linalg.norm(local.points(patches[0], where[0]) - local.points(patches[1], where[1]), axis=1)
     singular = np.linalg.svd(_slopes(local, patches, where, tangents), compute_uv=False)
     met = (gap < error) & (singular[:, 2] > 1e-4 * singular[:, 0])  # the surfaces cross, they do not just touch
     distance = _distance(local, patches, where)
@@ -178,8 +177,7 @@ def _search(local: Body, pieces: Pieces, pairs: IntArray, error: float) -> tuple
 def _slopes(body: Body, patches: list[IntArray], where: list[Array], tangents: list[IntArray]) -> Array:
     """Return the derivative (k, 3, 4) of F(p) - F(q) in the two free parameters of each."""
     of_p, of_q = (
-        np.take_along_axis(_by_patch(body, patches[k], where[k], BSplineVolume.jacobian), tangents[k][:, None], axis=2)
-        for k in range(2)
+        np.take_along_axis(body.jacobian(patches[k], where[k]), tangents[k][:, None], axis=2) for k in range(2)
     )
     return np.concatenate([of_p, -of_q], axis=2)
 
@@ -195,31 +193,17 @@ def _distance(body: Body, patches: list[IntArray], where: list[Array]) -> Array:
     return np.minimum(direct, sum(to_glued))
 
 
-def _by_patch(body: Body, patches: IntArray, where: Array, function: Callable[[BSplineVolume, Array], Array]) -> Array:
-    """Return the values (k, ...) of a function of a patch and parameters, at parameters (k, 3) of patches (k,)."""
-    numbers = np.unique(patches)
-    parts = [function(body.patches[number], where[patches == number]) for number in numbers]
-    values = np.empty((len(where), *parts[0].shape[1:]))
-    for number, part in zip(numbers, parts, strict=True):
-        values[patches == number] = part
-    return values
-
-
-def _at(body: Body, patches: IntArray, where: Array) -> Array:
-    """Return the points (k, 3) at parameters (k, 3) of patches (k,)."""
-    return _by_patch(body, patches, where, BSplineVolume.__call__)
-
-
 def _middles(body: Body, pieces: Pieces, rows: IntArray) -> Array:
     """Return the parameters (k, 3) of the middle of pieces."""
     middle = (pieces.low[rows] + pieces.high[rows]) / 2.0 ** (pieces.depth + 1)
-    return _by_patch(body, pieces.patches[rows], middle, _parameters)
+    patches = (body.patches[number] for number in pieces.patches[rows])
+    return np.stack([_parameters(patch, place) for patch, place in zip(patches, middle, strict=True)])
 
 
-def _parameters(volume: BSplineVolume, places: Array) -> Array:
-    """Return the parameters (k, 3) of places (k, 3) that are counted in spans."""
-    breaks = [breakpoints(knots) for knots in volume.knots]
-    return np.stack([np.interp(places[:, a], np.arange(len(breaks[a])), breaks[a]) for a in range(3)], axis=1)
+def _parameters(volume: BSplineVolume, place: Array) -> Array:
+    """Return the parameters (3,) of a place (3,) that is counted in spans."""
+    breaks = map(breakpoints, volume.knots)
+    return np.array([np.interp(x, np.arange(len(row)), row) for x, row in zip(place, breaks, strict=True)])
 
 
 def overlapping_boxes(low: Array, high: Array) -> IntArray:

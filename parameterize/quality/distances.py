@@ -11,11 +11,11 @@ import numpy as np
 from ..arrays import Array, IntArray
 from ..cube.cube import axis_and_side, damped_fit, tangent_axes
 from ..cube.cutting import subdivide_finely
-from ..spline.body import BodyLike, as_body
+from ..spline.body import Body, BodyLike, as_body
 from ..spline.bspline import breakpoints
 from ..spline.interface import varying
 from ..spline.sampled_boundary import SampledBoundary
-from ..spline.volume import BSplineVolume
+from ..spline.volume import FACE_NAMES
 from ..surface.geometry import area_shares, normals_and_areas
 from ..surface.nearest import closest_triangles, distance_to_mesh
 
@@ -60,13 +60,8 @@ def nearest_on_boundary(points: Array, body: BodyLike, boundary: SampledBoundary
     triangle, where, axis = places_near(
         points, boundary.points, boundary.triangles, boundary.parameters, boundary.cube_faces
     )
-    patches, distances = boundary.patches[boundary.triangles[triangle, 0]], np.empty(len(points))
-    for number, patch in enumerate(as_body(body)):
-        own = np.flatnonzero(patches == number)
-        if not own.size:
-            continue
-        where[own], distances[own] = closest_in_faces(points[own], patch, where[own], axis[own])
-    return patches, where, distances
+    patches = boundary.patches[boundary.triangles[triangle, 0]]
+    return patches, *closest_in_faces(points, as_body(body), patches, where, axis)
 
 
 def places_near(
@@ -85,22 +80,23 @@ def places_near(
     return triangle, places, axis
 
 
-def closest_in_faces(points: Array, volume: BSplineVolume, start: Array, axis: IntArray) -> tuple[Array, Array]:
+def closest_in_faces(points: Array, body: Body, patches: IntArray, start: Array, axis: IntArray) -> tuple[Array, Array]:
     """Return parameters (m, 3) near `start` whose values are closer to points (m, 3), and the distances (m,).
 
-    axis: (m,), the direction that is constant on the cube face of each start. Parameters stay on that face.
+    patches: (m,), of each point. axis: (m,), the direction that is constant on the cube face of each start. Parameters
+    stay on that face.
     """
     where, active = start.copy(), np.arange(len(points))
-    best: Array = np.linalg.norm(volume(where) - points, axis=1)
+    best: Array = np.linalg.norm(body.points(patches, where) - points, axis=1)
     for _ in range(_NEWTON_STEPS):
         trial, (a, b), rows = where[active], tangent_axes(axis[active]), np.arange(len(active))
-        jacobian = volume.jacobian(trial)  # (k, 3, 3)
-        right = points[active] - volume(trial)
+        jacobian = body.jacobian(patches[active], trial)  # (k, 3, 3)
+        right = points[active] - body.points(patches[active], trial)
         step_a, step_b = damped_fit(jacobian[rows, :, a], jacobian[rows, :, b], right, _DAMPING)
         trial[rows, a] += step_a
         trial[rows, b] += step_b
         np.clip(trial, 0.0, 1.0, out=trial)
-        distance = np.linalg.norm(volume(trial) - points[active], axis=1)
+        distance = np.linalg.norm(body.points(patches[active], trial) - points[active], axis=1)
         gain = best[active] - distance
         closer = gain > 0.0
         where[active[closer]], best[active[closer]] = trial[closer], distance[closer]
@@ -177,7 +173,8 @@ def _spacing(body: BodyLike, vertices: Array, faces: IntArray) -> float:
 def _outer_spans(body: BodyLike) -> int:
     """Return the number of knot spans, which are rectangles, on all faces that are not glued."""
     several, total = as_body(body), 0
-    for patch, names in zip(several.patches, several.outer, strict=True):
-        spans = [len(breakpoints(row)) - 1 for row in patch.knots]
-        total += sum(spans[a] * spans[b] for a, b in map(varying, names))
+    for group in several.groups:
+        spans = [len(breakpoints(row)) - 1 for row in group.knots]
+        of_faces = np.array([spans[a] * spans[b] for a, b in map(varying, FACE_NAMES)])
+        total += int((~several.glued[group.numbers] * of_faces).sum())
     return total

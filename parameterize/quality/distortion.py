@@ -13,7 +13,8 @@ from numpy.typing import ArrayLike
 from ..arrays import Array
 from ..spline.body import BodyLike, as_body
 from ..spline.bspline import gauss_points
-from ..spline.orientation import mirrored, orientation
+from ..spline.orientation import mirrored, orientation, orientations
+from ..spline.patch_groups import PatchGroup, group_of
 from ..spline.volume import BSplineVolume
 from .rotations import closest_rotations
 
@@ -73,56 +74,86 @@ def arap_grid(
     box: sides (3,) of the box that the map is measured against. Returns the points of each axis, the values
     (m_u, m_v, m_w) for each scale, and the weights of the integral over the cube.
     """
-    rules, weights = _rules(volume, n_gauss)
+    group = group_of(volume)
+    rules, weights = _rules(group, n_gauss)
     u, v, w = (points.ravel() for points, _ in rules)
-    values = [np.empty((len(u), len(v), len(w))) for _ in scales]
-    for slab, jacobians in _slabs(volume, rules):
+    values = [np.empty((1, len(u), len(v), len(w))) for _ in scales]
+    for part, jacobians in _slabs(group, rules):
         for row, found in zip(values, _arap(jacobians / np.asarray(box), scales), strict=True):
-            row[slab] = found
-    return (u, v, w), values, weights
+            row[part] = found
+    return (u, v, w), [row[0] for row in values], weights
 
 
 def in_own_box(volume: BSplineVolume) -> BoxDistortion:
     """Measure a volume against its own box, at three Gauss points a direction and span."""
-    rules, weights = _rules(volume, _N_GAUSS)
-    box = _own_box(volume, rules, weights)
-    mean, size, largest, least = 0.0, 0.0, -np.inf, np.inf
-    for slab, jacobians in _slabs(volume, rules):
-        values = _arap(jacobians / box, (1.0,))[0]
-        mean += float(np.sum(weights[slab] * values))
-        size += float(np.sum(weights[slab] * np.linalg.det(jacobians)))
-        largest, least = max(largest, float(values.max())), min(least, float(scaled_jacobian(jacobians).min()))
-    a, b, c = box.tolist()
-    return BoxDistortion((a, b, c), size, Distortion(mean, largest), least, weights.size)
+    (found,) = in_own_boxes(volume)
+    return found
+
+
+def in_own_boxes(body: BodyLike) -> tuple[BoxDistortion, ...]:
+    """Measure each patch of a body as `in_own_box` does."""
+    found: dict[int, BoxDistortion] = {}
+    for group in as_body(body).groups:
+        found |= zip(group.numbers.tolist(), _in_own_boxes(group), strict=True)
+    return tuple(found[number] for number in range(len(found)))
+
+
+def _in_own_boxes(group: PatchGroup) -> Iterator[BoxDistortion]:
+    """Yield the distortion of each patch of a group."""
+    rules, weights = _rules(group, _N_GAUSS)
+    boxes = _own_boxes(group, rules, weights)
+    mean, size = np.zeros((2, len(group)))
+    largest, least = np.full(len(group), -np.inf), np.full(len(group), np.inf)
+    for (rows, slab), jacobians in _slabs(group, rules):
+        values = _arap(jacobians / boxes[rows, None, None, None, None], (1.0,))[0]
+        mean[rows] += np.einsum("ijk,pijk->p", weights[slab], values)
+        size[rows] += np.einsum("ijk,pijk->p", weights[slab], np.linalg.det(jacobians))
+        largest[rows] = np.maximum(largest[rows], values.max(axis=(1, 2, 3)))
+        least[rows] = np.minimum(least[rows], scaled_jacobian(jacobians).min(axis=(1, 2, 3)))
+    for (a, b, c), volume, *arap, ratio in zip(
+        *map(np.ndarray.tolist, (boxes, size, mean, largest, least)), strict=True
+    ):
+        yield BoxDistortion((a, b, c), volume, Distortion(*arap), ratio, weights.size)
 
 
 def own_boxes(body: BodyLike) -> Array:
     """Return the sides (patches, 3) of each patch's own box: the mean lengths of F_u, F_v and F_w over the cube."""
-    return np.array([_own_box(patch, *_rules(patch, _N_GAUSS)) for patch in as_body(body)])
+    several = as_body(body)
+    boxes = np.empty((len(several), 3))
+    for group in several.groups:
+        boxes[group.numbers] = _own_boxes(group, *_rules(group, _N_GAUSS))
+    return boxes
 
 
-def _own_box(volume: BSplineVolume, rules: Rules, weights: Array) -> Array:
-    """Return the sides (3,) of a volume's own box from the values at the points of rules."""
-    parts = (
-        np.einsum("ijk,ijka->a", weights[slab], np.linalg.norm(jacobians, axis=-2))
-        for slab, jacobians in _slabs(volume, rules)
-    )
-    return np.asarray(sum(parts, np.zeros(3)))
+def _own_boxes(group: PatchGroup, rules: Rules, weights: Array) -> Array:
+    """Return the sides (k, 3) of the own boxes of the patches of a group from the values at the points of rules."""
+    boxes = np.zeros((len(group), 3))
+    for (rows, slab), jacobians in _slabs(group, rules):
+        boxes[rows] += np.einsum("ijk,pijka->pa", weights[slab], np.linalg.norm(jacobians, axis=-2))
+    return boxes
 
 
-def _rules(volume: BSplineVolume, n_gauss: int) -> tuple[Rules, Array]:
+def _rules(group: PatchGroup, n_gauss: int) -> tuple[Rules, Array]:
     """Return the Gauss points and weights of each direction, and the weights (m_u, m_v, m_w) of all points."""
-    rules = [gauss_points(k, n_gauss) for k in volume.knots]
+    rules = [gauss_points(k, n_gauss) for k in group.knots]
     return rules, np.einsum("i,j,k->ijk", *(weights.ravel() for _, weights in rules))
 
 
-def _slabs(volume: BSplineVolume, rules: Rules) -> Iterator[tuple[slice, Array]]:
-    """Yield the Jacobians (rows, m_v, m_w, 3, 3) at the points of rules slab by slab, which bounds the memory."""
+def _slabs(group: PatchGroup, rules: Rules) -> Iterator[tuple[tuple[slice, slice], Array]]:
+    """Yield the Jacobians (patches, rows, m_v, m_w, 3, 3) at the points of rules part by part: it bounds the memory.
+
+    Each part comes with its patches and its slab of rows along u. Left-handed patches are mirrored in x.
+    """
     u, v, w = (points.ravel() for points, _ in rules)
+    together = max(1, _SLAB_POINTS // (len(u) * len(v) * len(w)))
     step = max(1, _SLAB_POINTS // (len(v) * len(w)))
-    for start in range(0, len(u), step):
-        slab = slice(start, start + step)
-        yield slab, _unmirrored(volume, u[slab], v, w)
+    for begin, part in zip(range(0, len(group), together), group.divided(together), strict=True):
+        rows = slice(begin, begin + together)
+        signs = orientations(part)[:, None, None, None, None]
+        for start in range(0, len(u), step):
+            jacobians = part.grid_jacobian(u[start : start + step], v, w)
+            jacobians[..., 0, :] *= signs
+            yield (rows, slice(start, start + step)), jacobians
 
 
 def arap_on(volume: BSplineVolume, u: ArrayLike, v: ArrayLike, w: ArrayLike, box: ArrayLike = 1.0) -> Array:

@@ -16,12 +16,12 @@ from ..cube.boundary_map import BoundaryMap, on_faces
 from ..display import Shown
 from ..spline.body import Body, BodyLike, as_body, shared_numbers
 from ..spline.interface import face_layer
-from ..spline.orientation import enclosed_volume
-from ..spline.volume import FACE_NAMES, BSplineVolume
+from ..spline.orientation import enclosed_volumes
+from ..spline.volume import BSplineVolume
 from ..surface.features import SHARP
 from ..surface.geometry import signed_volume
 from .distances import Distances, two_sided
-from .distortion import BoxDistortion, Distortion, arap_grid, in_own_box
+from .distortion import BoxDistortion, Distortion, arap_grid, in_own_boxes
 from .sharpness import Sharpness, sharpness_of
 
 Measure = TypeVar("Measure", Distortion, Distances)
@@ -291,7 +291,7 @@ def _of_patches(
     body: Body, certificate: Certificate, boundary_check: BoundaryCheck, measured: dict[str, Any]
 ) -> QualityReport:
     """Return the report on several patches, each measured against its own box."""
-    patches, proof = tuple(map(in_own_box, body)), proved(body, certificate, boundary_check)
+    patches, proof = in_own_boxes(body), proved(body, certificate, boundary_check)
     mean = np.average([one.arap.mean for one in patches], weights=[abs(one.volume) for one in patches])
     whole = Distortion(float(mean), max(one.arap.max for one in patches))
     return QualityReport(
@@ -313,11 +313,10 @@ def _placed(body: Body, boundary: BoundaryMap, count: int) -> Array:
     Raises ValueError where a vertex lies on a patch that does not exist, or on no outer face of its patch.
     """
     patches, parameters = boundary.patches[:count], boundary.parameters[:count]
-    if body.is_single:
-        return body.only(parameters)
     points = body.points(patches, parameters)
-    outer = np.array([[name in names for name in FACE_NAMES] for names in body.outer])
-    lost = np.flatnonzero(~np.any(on_faces(parameters) & outer[patches], axis=1))
+    if body.is_single:
+        return points
+    lost = np.flatnonzero(~np.any(on_faces(parameters) & ~body.glued[patches], axis=1))
     if lost.size:
         first = lost[0]
         raise ValueError(
@@ -329,8 +328,8 @@ def _placed(body: Body, boundary: BoundaryMap, count: int) -> Array:
 
 def _volumes(body: Body, vertices: Array, faces: IntArray) -> Volumes:
     middle = vertices.mean(axis=0)
-    enclosed = (abs(enclosed_volume(patch, middle)) for patch in body)
-    return Volumes(sum(enclosed), abs(signed_volume(vertices - middle, faces)))
+    enclosed = (np.abs(enclosed_volumes(group, middle)).sum() for group in body.groups)
+    return Volumes(float(sum(enclosed)), abs(signed_volume(vertices - middle, faces)))
 
 
 def _both(as_given: Distances, scale: float) -> BothScales[Distances]:

@@ -4,17 +4,19 @@ A sharp edge is kept where an edge of F lies on it: elsewhere F is smooth. Norma
 that hardly count as distances.
 """
 
+from collections.abc import Iterator
 from dataclasses import asdict, dataclass
+from itertools import product
 from typing import Any
 
 import igl
 import numpy as np
 
-from ..arrays import Array, IntArray
+from ..arrays import Array, IntArray, Mask
 from ..spline.body import BodyLike, as_body
 from ..spline.bspline import divided_spans
+from ..spline.patch_groups import PatchGroup
 from ..spline.sampled_boundary import SampledBoundary
-from ..spline.volume import FACE_NAMES, BSplineVolume
 from ..surface.features import SHARP, Features, features_of
 from ..surface.geometry import normals_and_areas
 from ..surface.nearest import closest_triangles
@@ -85,27 +87,28 @@ def _samples(found: Features, vertices: Array) -> tuple[Array, Array]:
 def distance_to_edges(points: Array, body: BodyLike) -> Array:
     """Return the distances (k,) of points (k, 3) from the nearest edge of an outer face of a body."""
     several = as_body(body)
-    pieces = np.concatenate([curve for each in zip(several, several.outer, strict=True) for curve in _edges(*each)])
+    pieces = np.concatenate(
+        [curve for group in several.groups for curve in _edges(group, ~several.glued[group.numbers])]
+    )
     ends = np.ascontiguousarray(pieces.reshape(-1, 3))
     squared = igl.point_mesh_squared_distance(points, ends, np.arange(len(ends)).reshape(-1, 2))[0]
     return np.sqrt(np.asarray(squared).ravel())
 
 
-def _edges(patch: BSplineVolume, names: tuple[str, ...]) -> list[Array]:
-    """Return the straight pieces (k, 2, 3) of the edges of some faces of a patch."""
-    found = []
+def _edges(group: PatchGroup, faces: Mask) -> Iterator[Array]:
+    """Yield the straight pieces (k, 2, 3) of the edges of faces of the patches of a group, given by a mask (.., 6)."""
     for axis in range(3):
         others = [other for other in range(3) if other != axis]
-        for sides in ((0, 0), (0, 1), (1, 0), (1, 1)):
-            if any(FACE_NAMES[2 * other + side] in names for other, side in zip(others, sides, strict=True)):
-                rows = [np.array([0.0])] * 3
-                rows[axis] = divided_spans(patch.knots[axis], _PER_SPAN)
-                for other, side in zip(others, sides, strict=True):
-                    rows[other] = np.array([float(side)])
-                u, v, w = rows
-                line = patch.grid(u, v, w).reshape(-1, 3)
-                found.append(np.stack([line[:-1], line[1:]], axis=1))
-    return found
+        for sides in product((0, 1), repeat=2):
+            beside = [2 * other + side for other, side in zip(others, sides, strict=True)]
+            rows = [np.array([0.0])] * 3
+            rows[axis] = divided_spans(group.knots[axis], _PER_SPAN)
+            for other, side in zip(others, sides, strict=True):
+                rows[other] = np.array([float(side)])
+            u, v, w = rows
+            own = group.rows(faces[:, beside[0]] | faces[:, beside[1]])
+            lines = own.grid(u, v, w).reshape(len(own), len(rows[axis]), 3)
+            yield np.stack([lines[:, :-1], lines[:, 1:]], axis=2).reshape(-1, 2, 3)
 
 
 def _angles(body: BodyLike, vertices: Array, faces: IntArray) -> tuple[Array, Array]:

@@ -1,6 +1,6 @@
 """Defines Body: one spline volume or several, glued along whole faces, and the numbers of shared control points."""
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import compress
@@ -204,16 +204,30 @@ class Body(Brief, Shown):
 
         Raises ValueError for other shapes, and for the number of a patch that does not exist.
         """
+        return self._of_groups(patches, parameters, PatchGroup.at, 3)
+
+    def jacobian(self, patches: ArrayLike, parameters: ArrayLike) -> Array:
+        """Return J[i, a, b] = dF_a / du_b (m, 3, 3) at parameters (m, 3) of patches (m,). Raises as `points`."""
+        return self._of_groups(patches, parameters, PatchGroup.jacobian, 3, 3)
+
+    def _of_groups(
+        self,
+        patches: ArrayLike,
+        parameters: ArrayLike,
+        values: Callable[[PatchGroup, IntArray, Array], Array],
+        *shape: int,
+    ) -> Array:
+        """Return the values (m, *shape) of a function of a group, places in it and parameters."""
         owners, where = np.asarray(patches), np.asarray(parameters, dtype=np.float64)
         if owners.shape != (len(where),) or where.shape[1:] != (3,):
             raise ValueError(f"give patches (m,) and parameters (m, 3), got shapes {owners.shape} and {where.shape}")
         if len(unknown := np.setdiff1d(owners, np.arange(len(self)))):
             raise ValueError(f"there is no patch {unknown[0]}: the body has {len(self)}, from 0 on")
-        owners, found = owners.astype(np.int64), np.empty(where.shape)
-        labels, places = group_places(self.groups)
-        for label in np.unique(labels[owners]):
-            own = np.flatnonzero(labels[owners] == label)
-            found[own] = self.groups[label].at(places[owners[own]], where[own])
+        found = np.empty((len(where), *shape))
+        labels, places = (row[owners.astype(np.int64)] for row in group_places(self.groups))
+        for label in np.unique(labels):
+            own = np.flatnonzero(labels == label)
+            found[own] = values(self.groups[label], places[own], where[own])
         return found
 
     def locate(self, points: ArrayLike) -> tuple[IntArray, Array]:

@@ -18,7 +18,6 @@ from scipy.sparse import csr_array
 from ..arrays import Array, IntArray
 
 _ROUNDING = 1e-9  # by which a parameter may lie outside of the cube
-_PIECE = 4096  # points evaluated at a time: a bound of the memory
 
 
 def open_uniform_knots(n_control_points: int, degree: int) -> Array:
@@ -202,7 +201,7 @@ def apply_along(matrix: csr_array, field: Array, axis: int) -> Array:
     """Return `field` with a sparse matrix (m, n) applied along one axis, whose length goes from n to m."""
     moved = np.moveaxis(field, axis, 0)
     flat = np.asarray(matrix @ moved.reshape(moved.shape[0], -1))
-    return np.moveaxis(flat.reshape(-1, *moved.shape[1:]), 0, axis)
+    return np.moveaxis(flat.reshape(len(flat), *moved.shape[1:]), 0, axis)
 
 
 def interpolate_grid(knots: Sequence[Array], degree: int, values: Array) -> Array:
@@ -251,20 +250,36 @@ def checked_parameters(points: ArrayLike) -> Array:
 
 
 def evaluate_each(
-    degrees: Sequence[int], knots: Sequence[Array], coefficients: Array, members: IntArray, points: ArrayLike
+    degrees: Sequence[int],
+    knots: Sequence[Array],
+    coefficients: Array,
+    members: IntArray,
+    points: ArrayLike,
+    derivative: Sequence[int] = (0, 0, 0),
 ) -> Array:
     """Evaluate trivariate splines on the same knots at points (m, 3), each in the spline of one of the members (m,).
 
     coefficients: (k, n_u, n_v, n_w, c); returns (m, c). Raises ValueError as `evaluate_at`.
     """
     where = checked_parameters(points)
-    found = np.empty((len(where), coefficients.shape[4]))
-    for part in (slice(begin, begin + _PIECE) for begin in range(0, len(where), _PIECE)):
-        rows = [basis_derivatives(row, p, x) for row, p, x in zip(knots, degrees, where[part].T, strict=True)]
-        (i, u), (j, v), (k, w) = ((first[:, None] + np.arange(b.shape[2]), b[0]) for first, b in rows)
-        own = members[part][:, None, None, None]
-        near = coefficients[own, i[:, :, None, None], j[:, None, :, None], k[:, None, None]]
-        found[part] = np.einsum("mi,mj,mk,mijkc->mc", u, v, w, near, optimize=True)
+    rows = zip(knots, degrees, where.T, derivative, strict=True)
+    firsts, values = zip(*(basis_derivatives(row, p, np.ascontiguousarray(x), d) for row, p, x, d in rows), strict=True)
+    u, v, w = (basis[d] for basis, d in zip(values, derivative, strict=True))
+    return np.asarray(_sums(coefficients, members, np.stack(firsts), u, v, w))
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _sums(coefficients: Array, members: IntArray, first: IntArray, u: Array, v: Array, w: Array) -> Array:
+    """Return values (m, c) of members (m,) from basis values (m, p + 1) of the functions from first (3, m) on."""
+    found = np.zeros((len(members), coefficients.shape[4]))
+    for m in range(len(members)):
+        net = coefficients[members[m], first[0, m] :, first[1, m] :, first[2, m] :]
+        for i in range(u.shape[1]):
+            for j in range(v.shape[1]):
+                for k in range(w.shape[1]):
+                    factor = u[m, i] * v[m, j] * w[m, k]
+                    for c in range(found.shape[1]):
+                        found[m, c] += factor * net[i, j, k, c]
     return found
 
 

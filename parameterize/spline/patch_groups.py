@@ -4,15 +4,15 @@ A hexahedral mesh of thousands of patches is one group, or a few; one cube is a 
 """
 
 from collections import defaultdict
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays import Array, IntArray, Knots
+from ..arrays import Array, IntArray, Knots, Mask
 from .bspline import evaluate_each, evaluate_grid
-from .rational import Orders, homogeneous, projected, quotients
+from .rational import Orders, homogeneous, quotients
 from .volume import UNITS, BSplineVolume
 
 
@@ -47,12 +47,15 @@ class PatchGroup:
     def __len__(self) -> int:
         return len(self.numbers)
 
-    def divided(self, most: int) -> "Iterator[PatchGroup]":
+    def rows(self, rows: slice | IntArray | Mask) -> "PatchGroup":
+        """Return some of the patches, by their places in the group."""
+        weights = None if self.weights is None else self.weights[rows]
+        return replace(self, numbers=self.numbers[rows], control_points=self.control_points[rows], weights=weights)
+
+    def divided(self, most: int) -> Iterator["PatchGroup"]:
         """Yield the group in parts of at most so many patches."""
         for begin in range(0, len(self), most):
-            part = slice(begin, begin + most)
-            weights = None if self.weights is None else self.weights[part]
-            yield replace(self, numbers=self.numbers[part], control_points=self.control_points[part], weights=weights)
+            yield self.rows(slice(begin, begin + most))
 
     @property
     def coefficients(self) -> Array:
@@ -67,8 +70,17 @@ class PatchGroup:
 
     def at(self, places: IntArray, parameters: ArrayLike) -> Array:
         """Return F (m, 3) at parameters (m, 3) of the patches at places (m,) of the group."""
-        values = evaluate_each(self.degrees, self.knots, self.coefficients, places, parameters)
-        return values if self.weights is None else projected(values)[0]
+        return self._at(places, parameters, [(0, 0, 0)])[0]
+
+    def jacobian(self, places: IntArray, parameters: ArrayLike) -> Array:
+        """Return J[i, a, b] = dF_a / du_b (m, 3, 3) at parameters (m, 3) of the patches at places (m,)."""
+        return np.stack(self._at(places, parameters, UNITS), axis=-1)
+
+    def _at(self, places: IntArray, parameters: ArrayLike, orders: Sequence[Orders]) -> list[Array]:
+        net = self.coefficients
+        return self._derivatives(
+            lambda order: evaluate_each(self.degrees, self.knots, net, places, parameters, order), orders
+        )
 
     def grid(self, u: ArrayLike, v: ArrayLike, w: ArrayLike, derivative: Orders = (0, 0, 0)) -> Array:
         """Return F or one of its partial derivatives on a tensor grid: (k, len(u), len(v), len(w), 3)."""
@@ -80,10 +92,12 @@ class PatchGroup:
 
     def _on_grid(self, rows: Sequence[ArrayLike], orders: Sequence[Orders]) -> list[Array]:
         net = np.moveaxis(self.coefficients, 0, 3)
+        return self._derivatives(
+            lambda order: np.moveaxis(evaluate_grid(self.degrees, self.knots, net, rows, order), 3, 0), orders
+        )
 
-        def evaluate(order: Orders) -> Array:
-            return np.moveaxis(evaluate_grid(self.degrees, self.knots, net, rows, order), 3, 0)
-
+    def _derivatives(self, evaluate: Callable[[Orders], Array], orders: Sequence[Orders]) -> list[Array]:
+        """Return partial derivatives of F; evaluate: returns those of the splines of `coefficients`."""
         return list(map(evaluate, orders)) if self.weights is None else quotients(evaluate, orders)
 
 

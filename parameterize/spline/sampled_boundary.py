@@ -9,13 +9,11 @@ import numpy as np
 from ..arrays import Array, IntArray
 from .body import Body, BodyLike, as_body
 from .bspline import breakpoints, divided_spans
-from .interface import axis_side
 from .orientation import FACES
-from .volume import BSplineVolume
+from .patch_groups import PatchGroup
 
 SAMPLES = 160  # a direction and face of a cube, at least; more faces than six share as many samples
 PER_SPAN = 3  # samples a direction in every span, at least
-_NONE: IntArray = np.empty((0, 3), dtype=np.int64)
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,15 +40,15 @@ class SampledBoundary:
         if samples < 2:
             raise ValueError(f"samples must be at least 2, got {samples}")
         several = as_body(body)
-        share = min(1.0, sqrt(len(FACES) / sum(map(len, several.outer))))
+        share = min(1.0, sqrt(len(FACES) / (~several.glued).sum()))
         least = max(2, ceil(share * samples))
-        return cls._at(several, [_rows(patch, least) for patch in several])
+        return cls._at(several, [_rows(group, least) for group in several.groups])
 
     @classmethod
     def on(cls, body: BodyLike, *rows: Array) -> "SampledBoundary":
         """Sample all outer faces, those of all patches at the same three rows of parameters, each from 0 to 1."""
         several = as_body(body)
-        return cls._at(several, [rows] * len(several))
+        return cls._at(several, [rows] * len(several.groups))
 
     @property
     def sample_faces(self) -> IntArray:
@@ -61,29 +59,53 @@ class SampledBoundary:
 
     @classmethod
     def _at(cls, body: Body, rows: Sequence[Sequence[Array]]) -> "SampledBoundary":
-        """Sample the outer faces of each patch at its three rows of parameters."""
-        parts, count = [(np.empty((0, 3)), np.empty((0, 3)), _NONE, _NONE[:, 0], _NONE[:, 0])], 0
-        for number, (patch, names) in enumerate(zip(body, body.outer, strict=True)):
-            for name in names:
-                axis, side = axis_side(name)
-                u, v, w = (np.array([float(side)]) if d == axis else row for d, row in enumerate(rows[number]))
-                points = patch.grid(u, v, w).reshape(-1, 3)
-                places = np.stack(np.meshgrid(u, v, w, indexing="ij"), axis=-1).reshape(-1, 3)
-                face = _halved_cells(*(len(row) for d, row in enumerate(rows[number]) if d != axis))
-                inwards = (side == 1) == (axis == 1)  # (u, w) is left-handed seen along v
-                triangles = count + (face[:, ::-1] if inwards else face)
-                faces, owners = np.full(len(face), 2 * axis + side), np.full(len(points), number)
-                parts.append((places, points, triangles, faces, owners))
-                count += len(points)
-        return cls(*map(np.concatenate, zip(*parts, strict=True)))
+        """Sample the outer faces of the patches of each group at its three rows of parameters."""
+        parts = [
+            _face_samples(group.rows(~body.glued[group.numbers, face]), face, own)
+            for group, own in zip(body.groups, rows, strict=True)
+            for face in range(len(FACES))
+        ]
+        begins = np.cumsum([0, *(len(points) for _, points, *_ in parts)])
+        parameters, points, faces, triangles, triangle_faces = map(np.concatenate, zip(*parts, strict=True))
+        triangles += np.repeat(begins[:-1], [len(part[3]) for part in parts])[:, None]
+        order, rows_of_faces = (np.argsort(numbers, kind="stable") for numbers in (faces, triangle_faces))
+        place = np.empty_like(order)
+        place[order] = np.arange(len(order))
+        patches, cube_faces = faces[order] // len(FACES), triangle_faces[rows_of_faces] % len(FACES)
+        return cls(parameters[order], points[order], place[triangles[rows_of_faces]], cube_faces, patches)
 
 
-def _rows(volume: BSplineVolume, samples: int) -> tuple[Array, Array, Array]:
+def _face_samples(
+    group: PatchGroup, face: int, rows: Sequence[Array]
+) -> tuple[Array, Array, IntArray, IntArray, IntArray]:
+    """Return samples of a face of the patches of a group, and the triangles between them.
+
+    They are parameters (n, 3), points (n, 3) and the numbers 6 * patch + face (n,), patch after patch; triangles
+    (m, 3) and their faces' numbers (m,).
+    """
+    axis, side = FACES[face]
+    u, v, w = (np.array([float(side)]) if d == axis else row for d, row in enumerate(rows))
+    points = group.grid(u, v, w).reshape(-1, 3)
+    places = np.stack(np.meshgrid(u, v, w, indexing="ij"), axis=-1).reshape(-1, 3)
+    cells = _halved_cells(*(len(row) for d, row in enumerate(rows) if d != axis))
+    inwards = (side == 1) == (axis == 1)  # (u, w) is left-handed seen along v
+    triangles = len(places) * np.arange(len(group))[:, None, None] + (cells[:, ::-1] if inwards else cells)
+    numbers = len(FACES) * group.numbers + face
+    return (
+        np.tile(places, (len(group), 1)),
+        points,
+        np.repeat(numbers, len(places)),
+        triangles.reshape(-1, 3),
+        np.repeat(numbers, len(cells)),
+    )
+
+
+def _rows(group: PatchGroup, samples: int) -> tuple[Array, Array, Array]:
     """Return three rows of parameters, each span alike: at least `samples` of them, and PER_SPAN a span."""
-    spans = [len(breakpoints(row)) - 1 for row in volume.knots]
+    spans = [len(breakpoints(row)) - 1 for row in group.knots]
     u, v, w = (
         divided_spans(row, max(PER_SPAN, -(-(samples - 1) // count)))
-        for row, count in zip(volume.knots, spans, strict=True)
+        for row, count in zip(group.knots, spans, strict=True)
     )
     return u, v, w
 
