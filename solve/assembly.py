@@ -13,7 +13,7 @@ from parameterize.spline.volume import FACE_NAMES, BSplineVolume
 from .discretization.face_data import FaceRule, coefficients_of_patches, face_rule, has_face
 from .discretization.grouped import BodyMatrix, Law, assemble_body
 from .discretization.groups import Layout, OnPatches
-from .discretization.on_regions import weak_faces
+from .discretization.on_regions import renewed, weak_faces
 from .discretization.operator import FormOperator, Operator
 from .discretization.roughness import Measured, rules_of
 from .discretization.space import TrialSpace
@@ -21,8 +21,8 @@ from .discretization.unknowns import Unknowns
 from .discretization.weak import WeakFace
 from .field import Points
 from .forms.boundary_value_problem import BoundaryValueProblem
-from .forms.form import check_law
-from .forms.mass import WithMass
+from .forms.form import Form, check_law
+from .forms.mass import Mass, WithMass
 from .forms.problem import Problem
 from .options import SolveOptions
 
@@ -53,14 +53,38 @@ class Assembled(NamedTuple):
     loads: OnPatches
     known: OnPatches
 
+    def shifted(self, factor: float) -> "Assembled":
+        """Return the same with `factor` times the mass in the matrix."""
+        laws = [law._replace(form=WithMass(law.form, factor), source=None) for law in self.matrix.laws]
+        return self._replace(matrix=self.matrix.of(laws).with_faces([own.faces for own in self.matrix.parts]))
 
-def assemble_body_data(patches: Sequence[Stated], options: SolveOptions, shift: float = 0.0) -> Assembled:
-    """Return the matrix, the loads with the data on faces and regions, and the fixed coefficients of all patches.
+    @property
+    def mass(self) -> BodyMatrix:
+        """Return the mass matrix of one component, by the same quadrature rules: that of others would be a source."""
+        return self.matrix.of([law._replace(form=Mass(), source=None, component=0) for law in self.matrix.laws])
 
-    shift: the factor of the mass matrix that is added to that of the law.
-    """
-    couples = _check_laws(patches)
-    same = [_in_volume(patch.problem) if len(patches) > 1 else None for patch in patches]
+    def renewed(self, patches: Sequence[Stated]) -> "Assembled":
+        """Return the same matrix with other data, which act on the same places."""
+        matrix, nothing = self.matrix, Form()
+        nothing.components = self.loads.components
+        each = zip(matrix.laws, patches, _in_volumes(patches), strict=True)
+        laws = [
+            law._replace(form=nothing, source=patch.problem.source_at, component=None, same=same)
+            for law, patch, same in each
+        ]
+        _, loads = assemble_body(matrix.layout, laws, matrix.parts[0].threads)
+        for patch, own, load in zip(patches, matrix.parts, loads, strict=True):
+            if patch.problem.conditions:
+                for face in own.faces.values():
+                    renewed(face, patch.problem).add_load(load)
+            else:
+                _on_faces(patch.volume, patch.problem, patch.space, load)
+        return Assembled(matrix, loads, _known(patches, matrix.layout))
+
+
+def assemble_body_data(patches: Sequence[Stated], options: SolveOptions) -> Assembled:
+    """Return the matrix, the loads with the data on faces and regions, and the fixed coefficients of all patches."""
+    couples, same = _check_laws(patches), _in_volumes(patches)
     measured = [
         Measured(patch.volume, patch.space, patch.problem.form.tensor, law)
         for patch, law in zip(patches, same, strict=True)
@@ -69,24 +93,20 @@ def assemble_body_data(patches: Sequence[Stated], options: SolveOptions, shift: 
     for patch, rule, law in zip(patches, rules_of(measured, options.quadrature), same, strict=True):
         form, source = patch.problem.form, patch.problem.source_at
         component = 0 if form.components == 1 and form.symmetric and not couples else None
-        form = form if shift == 0.0 else WithMass(form, shift)
         laws.append(Law(patch.volume, patch.space, rule, form, source, component, law))
     layout = Layout.of([patch.space for patch in patches])
     matrix, loads = assemble_body(layout, laws, options.thread_count)
-    known = layout.empty(loads.components)
-    _give_values(patches, known)
     terms: list[dict[str, Any]] = []
     for patch, load in zip(patches, loads, strict=True):
-        volume, problem, space = patch.volume, patch.problem, patch.space
-        with space.agreed():
-            on_boundary = _on_regions if problem.conditions else _on_faces
-            terms.append(on_boundary(volume, problem, space, load))
-    return Assembled(matrix.with_faces(terms), loads, known)
+        with patch.space.agreed():
+            on_boundary = _on_regions if patch.problem.conditions else _on_faces
+            terms.append(on_boundary(patch.volume, patch.problem, patch.space, load))
+    return Assembled(matrix.with_faces(terms), loads, _known(patches, layout))
 
 
-def _give_values(patches: Sequence[Stated], known: Sequence[Array]) -> None:
-    """Write the fixed coefficients of each patch; those of patches with equal knots and data are found at once."""
-    groups = defaultdict(list)
+def _known(patches: Sequence[Stated], layout: Layout) -> OnPatches:
+    """Return the fixed coefficients of each patch; those of patches with equal knots and data are found at once."""
+    known, groups = layout.empty(patches[0].problem.form.components), defaultdict(list)
     for number, patch in enumerate(patches):
         volume, whole = patch.volume, patch.space.whole
         if whole.dirichlet:
@@ -96,10 +116,10 @@ def _give_values(patches: Sequence[Stated], known: Sequence[Array]) -> None:
     for numbers in groups.values():
         own = [patches[number] for number in numbers]
         boundary_at, whole = own[0].problem.boundary_at, own[0].space.whole
-        volumes, components = [patch.volume for patch in own], len(known[0])
-        found = coefficients_of_patches(volumes, whole, boundary_at, components)
+        found = coefficients_of_patches([patch.volume for patch in own], whole, boundary_at, known.components)
         for number, patch, values in zip(numbers, own, found, strict=True):
             known[number][:] = values[:, patch.space.rows]
+    return known
 
 
 def _check_laws(patches: Sequence[Stated]) -> bool:
@@ -117,9 +137,12 @@ def _check_laws(patches: Sequence[Stated]) -> bool:
     return couples
 
 
-def _in_volume(problem: BoundaryValueProblem) -> Hashable:
-    """Return what a problem's law and source are made of; a user's law is known by its object."""
-    return problem.in_volume, id(problem.form) if isinstance(problem, Problem) else type(problem.form).__name__
+def _in_volumes(patches: Sequence[Stated]) -> list[Hashable]:
+    """Return what the law and the source of each patch are made of; a user's law is known by its object."""
+    if len(patches) == 1:
+        return [None]
+    problems = [patch.problem for patch in patches]
+    return [(one.in_volume, id(one.form) if isinstance(one, Problem) else type(one.form).__name__) for one in problems]
 
 
 def assemble_data(

@@ -1,8 +1,8 @@
 """Marches through time with M u' + A u = f(t): BDF2 and the trapezoidal rule, step after step."""
 
 import logging
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from functools import cached_property
 from numbers import Integral, Real
 from pathlib import Path
@@ -17,21 +17,20 @@ from parameterize.old_names import takes_volume
 from parameterize.spline.body import Body, BodyLike, as_body
 from parameterize.threads import one_blas_thread
 
-from .assembly import assemble_data
+from .assembly import Assembled, assemble_body_data
 from .diagnostics import ConvergenceError
-from .discretization.operator import Operator, assemble
+from .discretization.groups import OnPatches
 from .discretization.projection import projected
 from .discretization.unknowns import Unknowns, unknowns_of
 from .field import BodyField, FieldOnBody
 from .forms.boundary_value_problem import BoundaryValueProblem
 from .forms.data import Data, parse
 from .forms.frame import UnitFrame
-from .forms.mass import Mass
 from .linear.krylov import generalized_residuals
 from .options import IterationOptions, SolveOptions
 from .patch_system import PatchProblem
 from .solver import prepared
-from .system import System, build, coefficients_in, field_of
+from .system import System, coefficients_in, field_of, system_of
 
 SCHEMES = ("bdf2", "trapezoidal")
 EULER = 1.0  # the factors of capacity / dt that a step adds to the matrix
@@ -189,7 +188,7 @@ def _check(dt: float, steps: int, scheme: str, capacity: float, every: int) -> N
 
 @dataclass(frozen=True, eq=False)
 class _Data:
-    """Evaluate a problem at any time, on one trial space. Coefficients are a list, (c, n_u, n_v, n_w) of each patch.
+    """Evaluate a problem at any time, on one trial space.
 
     placed, patches: the problem of the first time, placed in the body, and on each patch.
     """
@@ -206,50 +205,38 @@ class _Data:
         """Return the unknowns of all patches."""
         return unknowns_of([patch.space for patch in self.patches], self.body.interfaces)
 
-    def at(self, time: float) -> tuple[list[Array], list[Array]]:
-        """Return the loads and the coefficients given on faces.
+    @cached_property
+    def first(self) -> Assembled:
+        """Return what is assembled for the first time."""
+        return self._completed(assemble_body_data(self.patches, self.options))
+
+    def _completed(self, found: Assembled) -> Assembled:
+        """Return the same with all fixed coefficients of each patch."""
+        return found._replace(known=found.matrix.layout.joined(self.unknowns.completed(found.known)))
+
+    def at(self, time: float) -> Assembled:
+        """Return the matrix of the law with the loads and the coefficients given on faces.
 
         Raises ValueError where the faces with given coefficients are others than at the first time.
         """
-        return self._found(self.problem_at(time), time) if self.varies else self._constant
-
-    @cached_property
-    def _constant(self) -> tuple[list[Array], list[Array]]:
-        return self._found(self.placed, 0.0)
-
-    def _found(self, problem: BoundaryValueProblem, time: float) -> tuple[list[Array], list[Array]]:
+        if not self.varies:
+            return self.first
+        problem = self.problem_at(time)
         if problem.places != self.placed.places:
             raise ValueError(f"the problem of time {time:g} has data on other faces than that of the first time")
-        loads, known = [], []
-        for patch, given in zip(self.patches, problem.on(self.body).on_patches(self.body), strict=True):
-            _, load, fixed = assemble_data(patch.volume, given, patch.space, self.options)
-            loads.append(load)
-            known.append(fixed)
-        return loads, self.unknowns.completed(known)
+        each = zip(self.patches, problem.on(self.body).on_patches(self.body), strict=True)
+        return self._completed(self.first.renewed([replace(patch, problem=given) for patch, given in each]))
 
-    def filled(self, free: Array, known: Sequence[Array]) -> list[Array]:
+    def filled(self, free: Array, known: OnPatches) -> OnPatches:
         """Return all coefficients from the unknowns (c, ...) and the coefficients given on faces."""
-        return [full + given for full, given in zip(self.unknowns.spread(free), known, strict=True)]
+        return known.layout.joined(self.unknowns.spread(free)) + known
 
     def system(self, shift: float) -> System:
         """Return the system of the law plus `shift` times the mass."""
-        return build(self.body, self.placed, self.patches, self.options, shift)
-
-    def masses(self, system: System) -> list[Operator]:
-        """Return the mass matrix of all coefficients of each patch, by the quadrature rules of a system.
-
-        The mass by another rule would act as a source.
-        """
-        found = []
-        for patch in system.patches:
-            how: dict[str, Any] = {"rule": patch.matrix.rule, "threads": self.options.thread_count}
-            mass, _ = assemble(patch.volume, patch.space, Mass(), **how)
-            assert isinstance(mass, Operator)
-            found.append(mass)
-        return found
+        return system_of(self.body, self.placed, self.patches, self.first.shifted(shift), is_loose=True)
 
 
-def _started(data: _Data, start: FieldOnBody | Data, time: float) -> list[Array]:
+def _started(data: _Data, start: FieldOnBody | Data, time: float) -> OnPatches:
     """Return the coefficients of the start; those on faces follow from the data at `time`.
 
     A datum is projected on each patch: at an interface the mean of the patches' coefficients is taken.
@@ -263,19 +250,19 @@ def _started(data: _Data, start: FieldOnBody | Data, time: float) -> list[Array]
         parts = zip(data.patches, own, strict=True)
         full = [projected(patch.volume, patch.space, values) for patch, values in parts]
     copies = data.unknowns.collect([np.ones(part.shape) for part in full])
-    return data.filled(data.unknowns.collect(full) / copies, data.at(time)[1])
+    return data.filled(data.unknowns.collect(full) / copies, data.at(time).known)
 
 
 class _Path:
     """Hold the state of a march: the time, and the last and earlier coefficients of all patches."""
 
-    def __init__(self, data: _Data, scheme: str, rate: float, start: list[Array], time: float) -> None:
+    def __init__(self, data: _Data, scheme: str, rate: float, start: OnPatches, time: float) -> None:
         """Begin a march at a time; rate: the capacity over dt."""
         self.data, self.scheme, self.rate = data, scheme, rate
-        self.time, self.last, self.load = time, start, data.at(time)[0]
-        self.before: list[Array] | None = None
+        self.time, self.last, self.load = time, start, data.at(time).loads
+        self.before: OnPatches | None = None
         self.system = data.system(FACTORS[scheme] * rate)
-        self.masses = data.masses(self.system)
+        self.mass = data.first.mass
 
     @property
     def field(self) -> BodyField:
@@ -284,47 +271,35 @@ class _Path:
 
     def step(self, time: float) -> int:
         """March to a time, and return the number of iterations. Raises ConvergenceError."""
-        loads, known = self.data.at(time)
-        system, right = self._equation(loads)
+        new = self.data.at(time)
+        system, right = self._equation(new.loads)
         unknowns = self.data.unknowns
-        parts = zip(right, system.patches, known, strict=True)
-        free = unknowns.collect([own - patch.matrix.apply(given) for own, patch, given in parts])
+        free = unknowns.collect(right - system.matrix.apply(new.known))
         found = _solved(system, free, unknowns.chosen(self._guess), self.data.options)
         if not found.converged:
             raise ConvergenceError(
                 f"march: no convergence at time {time:g}, residual {found.residuals[-1]:.1e} after {found.iterations} "
                 "iterations: raise max_iterations or the tolerance"
             )
-        self.time, self.before, self.last, self.load = time, self.last, self.data.filled(found.x, known), loads
+        self.time, self.before, self.last, self.load = time, self.last, self.data.filled(found.x, new.known), new.loads
         log.info("time %g: %d iterations", time, found.iterations)
         return found.iterations
 
     @property
-    def _guess(self) -> list[Array]:
+    def _guess(self) -> OnPatches:
         """Return the coefficients on the line through the earlier and the last ones."""
+        return self.last if self.before is None else 2.0 * self.last - self.before
+
+    def _equation(self, load: OnPatches) -> tuple[System, OnPatches]:
+        """Return the system of a step and its right-hand side on all patches."""
+        if self.scheme == "trapezoidal":  # f_new + f + (s M - A) last, s = 2 / dt: that of (A + s M) new
+            shift = 2.0 * FACTORS[self.scheme] * self.rate
+            shifted = self.system.matrix.apply(self.last)
+            return self.system, load + self.load + shift * self.mass.apply(self.last) - shifted
         if self.before is None:
-            return self.last
-        return [2.0 * last - before for last, before in zip(self.last, self.before, strict=True)]
-
-    def _equation(self, loads: Sequence[Array]) -> tuple[System, list[Array]]:
-        """Return the system of a step and its right-hand side on each patch."""
-        numbers = range(len(loads))
-        if self.scheme == "trapezoidal":
-            return self.system, [self._trapezoidal(k, loads[k]) for k in numbers]
-        if self.before is None:
-            rate, parts = EULER * self.rate, zip(loads, self.masses, self.last, strict=True)
-            return self.data.system(rate), [load + rate * mass.apply(last) for load, mass, last in parts]
-        return self.system, [self._backward(k, loads[k], self.before[k]) for k in numbers]
-
-    def _trapezoidal(self, k: int, load: Array) -> Array:
-        """Return f_new + f + (s M - A) last on patch k, s = 2 / dt: that of (A + s M) new."""
-        last = self.last[k]
-        shifted = self.system.patches[k].matrix.apply(last)
-        return load + self.load[k] + 2.0 * FACTORS[self.scheme] * self.rate * self.masses[k].apply(last) - shifted
-
-    def _backward(self, k: int, load: Array, before: Array) -> Array:
-        """Return the right-hand side of BDF2 on patch k."""
-        return load + 0.5 * self.rate * self.masses[k].apply(4.0 * self.last[k] - before)
+            rate = EULER * self.rate
+            return self.data.system(rate), load + rate * self.mass.apply(self.last)
+        return self.system, load + 0.5 * self.rate * self.mass.apply(4.0 * self.last - self.before)
 
 
 def _solved(system: System, right: Array, guess: Array, options: IterationOptions) -> LinearResult:

@@ -17,7 +17,7 @@ from parameterize.spline.bspline import greville
 from parameterize.spline.interface import Interface
 from parameterize.threads import one_blas_thread
 
-from .assembly import assemble_body_data, balanced
+from .assembly import Assembled, assemble_body_data, balanced
 from .diagnostics import ConvergenceError, failure, judge, map_notices
 from .discretization.error_norms import Compared, Errors, error_norms, missing_mean
 from .discretization.estimate import error_estimate
@@ -91,7 +91,7 @@ class System:
     unknowns: Unknowns
     blocks: tuple[Preconditioner, ...]  # a component each
     right: Array  # b, (c, ...): of the free coefficients
-    setup: float  # process seconds
+    setup: float = 0.0  # process seconds
 
     @property
     def space(self) -> TrialSpace:
@@ -351,33 +351,36 @@ def build(
     problem: BoundaryValueProblem,
     patches: Sequence[PatchProblem],
     options: SolveOptions,
-    shift: float = 0.0,
     is_loose: bool = False,
 ) -> System:
     """Return the system of a problem on a body, whose data are placed in it (`problem.on`).
 
-    patches: the problem on each patch. shift: the factor of the mass matrix in A, which is added to the law's matrix.
-    is_loose: whether motions that nothing holds are no fault; a body with a shift is loose.
+    patches: the problem on each patch. is_loose: whether motions that nothing holds are no fault.
     """
-    is_loose = is_loose or shift != 0.0
     start = time.process_time()
     with one_blas_thread():
-        found = assemble_body_data(patches, options, shift)
-        matrix, loads = found.matrix, found.loads
-        unknowns = unknowns_of([patch.space for patch in patches], body.interfaces)
-        known = matrix.layout.joined(unknowns.completed(found.known))
-        systems = systems_of(patches, found._replace(known=known))
-        _demand_held(body, problem, systems, is_loose)
-        blocks = preconditioners(unknowns, [system.operators for system in systems], body.interfaces)
-        if blocks[0].singular and not is_loose and isinstance(systems[0].matrix, FormOperator):
-            raise ValueError(
-                f"{type(problem.form).__name__} without a reaction, and with Neumann data on all faces, does not "
-                "determine the solution: give a value, or an exchange, on a face or a region"
-            )
-        right = unknowns.collect(replace(loads, flat=loads.flat - matrix.apply(known).flat))
-        right = balanced(right, unknowns, systems[0].space) if blocks[0].singular and not is_loose else right
-        setup = time.process_time() - start
-    return System(body, problem, systems, matrix, unknowns, blocks, right, setup)
+        system = system_of(body, problem, patches, assemble_body_data(patches, options), is_loose)
+    return replace(system, setup=time.process_time() - start)
+
+
+def system_of(
+    body: Body, problem: BoundaryValueProblem, patches: Sequence[PatchProblem], found: Assembled, is_loose: bool
+) -> System:
+    """Return the system of `build` from what is assembled."""
+    matrix, loads = found.matrix, found.loads
+    unknowns = unknowns_of([patch.space for patch in patches], body.interfaces)
+    known = matrix.layout.joined(unknowns.completed(found.known))
+    systems = systems_of(patches, found._replace(known=known))
+    _demand_held(body, problem, systems, is_loose)
+    blocks = preconditioners(unknowns, [system.operators for system in systems], body.interfaces)
+    if blocks[0].singular and not is_loose and isinstance(systems[0].matrix, FormOperator):
+        raise ValueError(
+            f"{type(problem.form).__name__} without a reaction, and with Neumann data on all faces, does not "
+            "determine the solution: give a value, or an exchange, on a face or a region"
+        )
+    right = unknowns.collect(loads - matrix.apply(known))
+    right = balanced(right, unknowns, systems[0].space) if blocks[0].singular and not is_loose else right
+    return System(body, problem, systems, matrix, unknowns, blocks, right)
 
 
 def _demand_held(body: Body, problem: BoundaryValueProblem, systems: Sequence[PatchSystem], is_loose: bool) -> None:

@@ -109,10 +109,13 @@ class BodyMatrix:
         """Return the same matrix with terms on faces of each patch."""
         return replace(self, parts=[replace(own, faces=more) for own, more in zip(self.parts, faces, strict=True)])
 
+    def of(self, laws: Sequence[Law]) -> "BodyMatrix":
+        """Return the matrix of other laws on the same patches, without terms on faces."""
+        return assemble_body(self.layout, laws, self.parts[0].threads)[0]
+
     def block(self, component: int) -> "BodyMatrix":
         """Return the symmetric part of a component's diagonal block, for its own gradient and value."""
-        laws = [law._replace(source=None, component=component) for law in self.laws]
-        found, _ = assemble_body(self.layout, laws, self.parts[0].threads)
+        found = self.of([law._replace(source=None, component=component) for law in self.laws])
         both = zip(found.parts, self.parts, strict=True)
         return replace(found, parts=[replace(block, faces=own.faces, component=component) for block, own in both])
 

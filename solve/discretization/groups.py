@@ -9,7 +9,7 @@ one.
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, overload
 
@@ -72,14 +72,27 @@ class Layout:
 
 @dataclass(frozen=True, eq=False)
 class OnPatches(Sequence[Array]):
-    """Hold an array (c, n_u, n_v, n_w) for each patch of a body, all of them parts of one array `flat`."""
+    """Hold an array (c, n_u, n_v, n_w) for each patch of a body, all of them parts of one array `flat`.
+
+    They add up, and are multiplied by numbers, as vectors do.
+    """
 
     layout: Layout
     components: int
     flat: Array
+    __array_ufunc__ = None  # a number of NumPy times this is __rmul__, too
 
     def __len__(self) -> int:
         return len(self.layout.shapes)
+
+    def __add__(self, other: "OnPatches") -> "OnPatches":
+        return replace(self, flat=self.flat + other.flat)
+
+    def __sub__(self, other: "OnPatches") -> "OnPatches":
+        return replace(self, flat=self.flat - other.flat)
+
+    def __rmul__(self, factor: float) -> "OnPatches":
+        return replace(self, flat=factor * self.flat)
 
     @overload
     def __getitem__(self, number: int) -> Array: ...

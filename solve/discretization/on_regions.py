@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from scipy.sparse import csr_array
 
-from parameterize.arrays import Array, in_brackets
+from parameterize.arrays import Array, IntArray, in_brackets
 from parameterize.spline.body import all_control_points, size_of
 from parameterize.spline.bspline import basis_derivatives, breakpoints, sparse_rows
 from parameterize.spline.interface import axis_side
@@ -147,67 +147,40 @@ def _coder(problem: BoundaryValueProblem, name: str, strong: Value | None) -> Ca
     return codes
 
 
+def renewed(face: WeakFace, problem: BoundaryValueProblem) -> WeakFace:
+    """Return a face with the loads and values of another problem, whose conditions act on the same regions."""
+    acting = _Acting(problem, face.x, face.normal, face.weights, face.codes)
+    projector, values = acting.held()
+    return replace(face, values=values, loads=acting.natural(projector)[0])
+
+
 @dataclass(frozen=True, eq=False)
-class _Builder:
-    volume: BSplineVolume
+class _Acting:
+    """Evaluate the conditions that act at m points of a face; attributes as in WeakFace."""
+
     problem: BoundaryValueProblem
-    space: TrialSpace
-    name: str
-    rule: SurfaceRule
-
-    @property
-    def _points(self) -> Points:
-        return Points.at(np.ascontiguousarray(self.rule.at.x), self.rule.at.parameters)
-
-    def demand_consistent(self) -> None:
-        """Raise ValueError where values contradict each other, or a load acts on a held part."""
-        x, normal = self._points, self.rule.at.normal
-        self._natural(x, normal, self._held(x, normal)[0])
-
-    def face(self) -> WeakFace:
-        """Return the terms of the face."""
-        form, at, weights = self.problem.form, self.rule.at, self.rule.weights
-        x, normal = self._points, at.normal
-        projector, given = self._held(x, normal)
-        gamma, slowest = self._gamma(x, normal)
-        loads, factor = self._natural(x, normal, projector)
-        axis, side = axis_side(self.name)
-        tables, slope = self._tables(axis, side)
-        ends = [tuple(-end if a == axis else slice(None) for a in range(3)) for end in ((1, 2) if side else (0, -1))]
-        inside = np.einsum("ccm->m", projector) > 0.5
-        return WeakFace(
-            name=self.name,
-            form=form,
-            x=x,
-            normal=normal,
-            weights=weights,
-            inverse=np.asarray(np.linalg.inv(at.jacobian).transpose(1, 2, 0), dtype=np.float64),
-            codes=self.rule.codes,
-            projector=projector,
-            values=given,
-            gamma=gamma,
-            slowest=slowest,
-            factor=factor,
-            loads=np.einsum("cdm,dm->cm", np.eye(form.components)[:, :, None] - projector, loads),
-            is_whole=bool((weights[inside] / at.size[inside]).sum() > WHOLE),
-            tables=tables,
-            slope=slope,
-            layers=(ends[0], ends[1]),
-        )
+    x: Points
+    normal: Array
+    weights: Array
+    codes: IntArray
 
     def _holding(self, condition: int) -> Any:
-        return self.rule.codes >> (condition + 1) & 1 == 1
+        return self.codes >> (condition + 1) & 1 == 1
 
-    def _held(self, x: Points, normal: Array) -> tuple[Array, Array]:
+    def _part(self, points: Any) -> Points:
+        assert self.x.places is not None
+        return Points.at(np.ascontiguousarray(self.x[:, points]), self.x.places[points])
+
+    def held(self) -> tuple[Array, Array]:
         """Return the projector P (c, c, m) onto the directions along which u is given, and P g (c, m)."""
-        c, m = self.problem.form.components, len(self.rule.weights)
+        c, m = self.problem.form.components, len(self.weights)
         projector, given = np.zeros((c, c, m)), np.zeros((c, m))
         for i, condition in enumerate(self.problem.conditions):
             here = np.flatnonzero(self._holding(i))
             if not isinstance(condition, Value) or not len(here):
                 continue
-            points = Points.at(np.ascontiguousarray(x[:, here]), x.places[here])  # type: ignore[index]
-            for direction in condition.directions(c, normal[:, here]):
+            points = self._part(here)
+            for direction in condition.directions(c, self.normal[:, here]):
                 value = condition.values_along(direction, self.problem, points)
                 new = direction - np.einsum("cdm,dm->cm", projector[:, :, here], direction)
                 size = np.linalg.norm(new, axis=0)
@@ -230,25 +203,25 @@ class _Builder:
 
     def _is_area(self, points: Any, region: Any) -> bool:
         """Return whether some points form more of a region than the rim along which two regions touch."""
-        return bool(self.rule.weights[points].sum() > RIM * self.rule.weights[region].sum())
+        return bool(self.weights[points].sum() > RIM * self.weights[region].sum())
 
     def _place(self, point: int) -> str:
-        return "(" + ", ".join(f"{value:.4g}" for value in self.rule.at.x[:, point]) + ")"
+        return "(" + ", ".join(f"{value:.4g}" for value in self.x[:, point]) + ")"
 
-    def _natural(self, x: Points, normal: Array, projector: Array) -> tuple[Array, Array]:
-        """Return the given flux into the body (c, m), and the factor (m,) of exchanges.
+    def natural(self, projector: Array) -> tuple[Array, Array]:
+        """Return the given flux into the body (c, m), beside held directions, and the factor (m,) of exchanges.
 
         Raises ValueError where a load acts on a held part of the boundary.
         """
-        loads, factor = np.zeros((self.problem.form.components, len(self.rule.weights))), np.zeros(len(x[0]))
+        loads, factor = np.zeros((self.problem.form.components, len(self.weights))), np.zeros(len(self.weights))
         named = np.zeros(len(factor), dtype=bool)
         for i, condition in enumerate(self.problem.conditions):
             here = np.flatnonzero(self._holding(i))
             named[here] = True
             if condition.is_essential or not len(here):
                 continue
-            points = Points.at(np.ascontiguousarray(x[:, here]), x.places[here])  # type: ignore[index]
-            found = condition.flux_at(self.problem, points, normal[:, here])
+            points = self._part(here)
+            found = condition.flux_at(self.problem, points, self.normal[:, here])
             lost = np.abs(np.einsum("cdm,dm->cm", projector[:, :, here], found)).max(axis=0)
             wrong = here[lost > CONTRADICTION * np.abs(found).max()]
             if condition.datum is not None and self._is_area(wrong, here):
@@ -256,11 +229,12 @@ class _Builder:
             loads[:, here] += found
             if condition.factor is not None:
                 factor[here] += condition.factor_at(points)
-        rest = np.flatnonzero((self.rule.codes & 1 == 1) & ~named | self._partly_held(projector, named))
+        rest = np.flatnonzero((self.codes & 1 == 1) & ~named | self._partly_held(projector, named))
         if self.problem.exact_formulas and len(rest):
-            points = Points.at(np.ascontiguousarray(x[:, rest]), x.places[rest])  # type: ignore[index]
-            loads[:, rest] += self.problem.exact_flux("flux", points, normal[:, rest])
-        return loads, factor
+            points = self._part(rest)
+            loads[:, rest] += self.problem.exact_flux("flux", points, self.normal[:, rest])
+        free = np.eye(self.problem.form.components)[:, :, None] - projector
+        return np.einsum("cdm,dm->cm", free, loads), factor
 
     def _partly_held(self, projector: Array, named: Array) -> Array:
         """Return the mask of points with the exact solution's flux in the components that a value leaves free."""
@@ -276,6 +250,57 @@ class _Builder:
         remedy = "give one of them" if is_same else f"write '{condition.region} and not ({held[0].region})'"
         raise ValueError(
             f"{condition.role} acts where {held[0].role} holds the body, as at {self._place(point)}: {remedy}"
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class _Builder:
+    volume: BSplineVolume
+    problem: BoundaryValueProblem
+    space: TrialSpace
+    name: str
+    rule: SurfaceRule
+
+    @property
+    def _acting(self) -> _Acting:
+        at = self.rule.at
+        x = Points.at(np.ascontiguousarray(at.x), at.parameters)
+        return _Acting(self.problem, x, at.normal, self.rule.weights, self.rule.codes)
+
+    def demand_consistent(self) -> None:
+        """Raise ValueError where values contradict each other, or a load acts on a held part."""
+        acting = self._acting
+        acting.natural(acting.held()[0])
+
+    def face(self) -> WeakFace:
+        """Return the terms of the face."""
+        form, at, weights, acting = self.problem.form, self.rule.at, self.rule.weights, self._acting
+        x, normal = acting.x, acting.normal
+        projector, given = acting.held()
+        gamma, slowest = self._gamma(x, normal)
+        loads, factor = acting.natural(projector)
+        axis, side = axis_side(self.name)
+        tables, slope = self._tables(axis, side)
+        ends = [tuple(-end if a == axis else slice(None) for a in range(3)) for end in ((1, 2) if side else (0, -1))]
+        inside = np.einsum("ccm->m", projector) > 0.5
+        return WeakFace(
+            name=self.name,
+            form=form,
+            x=x,
+            normal=normal,
+            weights=weights,
+            inverse=np.asarray(np.linalg.inv(at.jacobian).transpose(1, 2, 0), dtype=np.float64),
+            codes=self.rule.codes,
+            projector=projector,
+            values=given,
+            gamma=gamma,
+            slowest=slowest,
+            factor=factor,
+            loads=loads,
+            is_whole=bool((weights[inside] / at.size[inside]).sum() > WHOLE),
+            tables=tables,
+            slope=slope,
+            layers=(ends[0], ends[1]),
         )
 
     def _gamma(self, x: Points, normal: Array) -> tuple[Array, Array]:
