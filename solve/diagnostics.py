@@ -1,6 +1,7 @@
 """Judges the numbers of a solve: notices on its data, its map, its mesh and its linear solver."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -9,6 +10,7 @@ from parameterize.conjugate_gradients import INDEFINITE, LinearResult
 from parameterize.quality.distortion import scaled_jacobian
 from parameterize.spline.bspline import breakpoints
 from parameterize.spline.orientation import orientation
+from parameterize.spline.patch_groups import groups_of
 from parameterize.spline.volume import AXES, FACE_NAMES, BSplineVolume
 
 from .discretization.error_norms import Errors
@@ -26,6 +28,7 @@ from .solution import Solution
 SAMPLES = np.concatenate([[0.0], np.sort(np.random.default_rng(0).uniform(0.0, 1.0, 7)), [1.0]])
 _RANDOM = np.random.default_rng(1)  # points of all sizes, somewhere among which a formula that can vary does so
 ANYWHERE = _RANDOM.choice([-1.0, 1.0], (3, 300)) * 10.0 ** _RANDOM.uniform(-3.0, 4.0, (3, 300))
+MANY = 200  # patches from which on three places a direction suffice for each
 INSIDE = np.linspace(0.05, 0.95, 7)  # parameters per direction at which data are compared with `exact`
 SMALLEST = 1e-150  # values whose squares underflow
 ROUNDING = 1e-13  # share of the size by which a formula must vary
@@ -90,7 +93,11 @@ def judge(
 
 def _samples(patches: Sequence[PatchProblem]) -> tuple[Array, dict[str, Array]]:
     """Return points (3, ...) of all patches, and those of their faces: of "u0" of all patches, of "p2_u0" of one."""
-    every = [np.asarray(Points.on(patch.volume, SAMPLES, SAMPLES, SAMPLES)) for patch in patches]
+    rows = SAMPLES if len(patches) <= MANY else SAMPLES[:: len(SAMPLES) // 2]
+    every: list[Any] = [None] * len(patches)
+    for group in groups_of([patch.volume for patch in patches]):
+        for number, points in zip(group.numbers, np.moveaxis(group.grid(rows, rows, rows), -1, 1), strict=True):
+            every[number] = points
     ends: dict[str, Array] = {}
     for name in FACE_NAMES:
         parts = [np.take(points, -int(name[1]), 1 + AXES.index(name[0])) for points in every]

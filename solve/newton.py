@@ -20,7 +20,7 @@ from .diagnostics import ConvergenceError, judge
 from .discretization.error_norms import Compared, error_norms
 from .discretization.nonlinear import Forces, Tangent
 from .discretization.on_regions import demand_area
-from .discretization.space import longest_edge
+from .discretization.space import longest_edges
 from .discretization.unknowns import Unknowns, unknowns_of
 from .discretization.weak import WeakFace
 from .field import FieldOnBody
@@ -326,7 +326,7 @@ def _solution(
     report = SolveReport(
         elements=sum(patch.space.elements for patch in patches),
         dofs=dofs,
-        h=max(longest_edge(patch.volume, patch.space) for patch in patches),
+        h=longest_edges([patch.volume for patch in patches], [patch.space for patch in patches]),
         iterations=len(history) - more,
         converged=True,
         residual=history[-1],

@@ -76,11 +76,15 @@ def _shown(force: Sequence[float]) -> str:
 
 
 def balance(
-    problem: BoundaryValueProblem, patches: Sequence[PatchSystem], unknowns: Unknowns, coefficients: Sequence[Array]
+    problem: BoundaryValueProblem,
+    patches: Sequence[PatchSystem],
+    unknowns: Unknowns,
+    coefficients: Sequence[Array],
+    products: Sequence[Array],
 ) -> Balance:
-    """Return the balance of a solution's coefficients, (c, n_u, n_v, n_w) for each patch."""
+    """Return the balance of a solution's coefficients (c, n_u, n_v, n_w) of each patch, and of their products."""
     space, components = patches[0].space, problem.form.components
-    residuals = [patch.matrix.apply(full) - patch.loads for patch, full in zip(patches, coefficients, strict=True)]
+    residuals = [product - patch.loads for patch, product in zip(patches, products, strict=True)]
     faces = [face for patch in patches for face in patch.weak]
     reactions, own = _of_faces(patches, unknowns.on_fixed(residuals)), np.zeros(components)
     supports = _supports(problem)

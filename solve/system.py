@@ -25,7 +25,7 @@ from .discretization.grouped import BodyMatrix, Law, assemble_body
 from .discretization.on_regions import demand_area, demand_supports
 from .discretization.operator import FormOperator, Operator
 from .discretization.quadrature import GaussRule, operator_rule
-from .discretization.space import TrialSpace, embedded, longest_edge
+from .discretization.space import TrialSpace, embedded, longest_edges
 from .discretization.unknowns import Glued, Unknowns, unknowns_of
 from .field import BodyField, FieldOnBody, SplineField
 from .forms.boundary_value_problem import BoundaryValueProblem
@@ -236,7 +236,7 @@ class System:
         report = SolveReport(
             elements=sum(patch.space.elements for patch in self.patches),
             dofs=dofs,
-            h=max(longest_edge(patch.volume, patch.space) for patch in self.patches),
+            h=longest_edges([patch.volume for patch in self.patches], [patch.space for patch in self.patches]),
             iterations=result.iterations,
             converged=result.converged,
             residual=result.residuals[-1],
@@ -247,7 +247,7 @@ class System:
             meaningful=meaningful and has_norm,
             residuals=result.residuals,
             traffic=traffic,
-            balance=balance(problem, self.patches, self.unknowns, full) if has_norm else None,
+            balance=balance(problem, self.patches, self.unknowns, full, self.matrix.apply(full)) if has_norm else None,
         )
         problems = [patch.problem for patch in self.patches]
         return Solution.of(field_of(self.body, self.patches, full), problems, report, problem)
@@ -256,7 +256,13 @@ class System:
         """Return coefficients (c, n_u, n_v, n_w) of each patch with the exact values, zero where none are known."""
         exact = self.problem.exact is not None
         return [
-            Compared(patch.volume, patch.space, own, patch.problem.exact_at if exact else _nothing)
+            Compared(
+                patch.volume,
+                patch.space,
+                own,
+                patch.problem.exact_at if exact else _nothing,
+                patch.problem.in_volume if exact and len(full) > 1 else None,
+            )
             for patch, own in zip(self.patches, full, strict=True)
         ]
 

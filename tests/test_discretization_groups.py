@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import iga_nn
+from solve.discretization.error_norms import Compared, error_norms
 from solve.discretization.groups import Layout
 from solve.discretization.operator import assemble, diagonals
 from solve.discretization.space import trial_space
@@ -103,3 +104,19 @@ def test_stacked_diagonalizations_are_those_of_single_patches():
         expected = np.zeros(result.shape)
         expected[window] = fast_diagonalization(operator).held()(np.ascontiguousarray(residual[window]))
         assert result == pytest.approx(expected, rel=1e-8, abs=1e-9 * np.abs(expected).max())
+
+
+@pytest.mark.parametrize("counts", [(3, 3, 3), (3, 4, 3)])
+def test_errors_of_a_body_are_those_of_its_patches(counts):
+    body = row_of(counts)
+    fields = iga_nn.solve(body, iga_nn.Poisson(source="1")).patches
+    problem = iga_nn.Poisson(exact="sin(x)*y")
+    parts = [
+        Compared(one.geometry, trial_space(one.geometry), one.coefficients[None], problem.exact_at, "one")
+        for one in fields
+    ]
+    whole, each = error_norms(parts), [error_norms([part]) for part in parts]
+    assert whole.l2**2 == pytest.approx(sum(one.l2**2 for one in each), rel=1e-12)
+    assert whole.h1_seminorm**2 == pytest.approx(sum(one.h1_seminorm**2 for one in each), rel=1e-12)
+    size = sum((one.h1_seminorm / one.h1_relative) ** 2 for one in each) ** 0.5
+    assert whole.h1_relative == pytest.approx(whole.h1_seminorm / size, rel=1e-12)

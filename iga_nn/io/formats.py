@@ -21,7 +21,7 @@ from parameterize.files import replacing
 from parameterize.spline.body import TOLERANCE, Body, BodyLike, as_body, shared_numbers
 from parameterize.spline.volume import BSplineVolume
 from parameterize.surface.readers.file import FORMATS as SURFACES
-from solve.discretization.space import TrialSpace, longest_edge
+from solve.discretization.space import TrialSpace, longest_edges
 from solve.field import BodyField, SplineField
 from solve.forms.boundary_value_problem import BoundaryValueProblem
 
@@ -217,7 +217,7 @@ def _load_solution(path: Path, body: BodyLike) -> tuple[BodyField, BoundaryValue
     section = report.get(name, {})
     if (there := _mesh_size(section, several, fields)) is not None:
         spaces = (TrialSpace(field.degrees, field.knots) for field in fields)
-        here = max(map(longest_edge, several, spaces))
+        here = longest_edges(several.patches, list(spaces))
         if not np.isclose(here, there, rtol=1e-9):
             raise InputError(
                 f"{path}: belongs to another volume: the longest edge of its elements is {there:.6g}, here {here:.6g}"

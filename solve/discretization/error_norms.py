@@ -1,8 +1,8 @@
 """Computes the errors of a solution against an exact solution."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -11,10 +11,11 @@ from parameterize.spline.volume import BSplineVolume
 from parameterize.threads import in_parallel
 
 from ..field import Points
-from . import kernels
+from . import group_kernels, kernels
 from .error_kernels import error_squares
-from .quadrature import GaussRule, gauss_rule, geometry_planes, map_rows
+from .quadrature import GaussRule, gauss_rule, map_rows
 from .space import TrialSpace
+from .stack import Piece, Stack, Stacked, stacks_of
 
 PLANES = 16  # of points of u, in a piece of work
 POINTS = 2**15  # of a plane that are evaluated at once: their arrays fit into a processor's cache
@@ -27,13 +28,14 @@ class Compared(NamedTuple):
     """Hold a solution on one patch: coefficients (c, n_u, n_v, n_w) in a space, and the exact values.
 
     exact: a function of points (3, ...) that returns u (c, ...) and grad u (c, 3, ...), or None in place of the
-    gradient.
+    gradient. same: equal for patches on which `exact` is the same function of the points; by default it is its own.
     """
 
     volume: BSplineVolume
     space: TrialSpace
     coefficients: Array
     exact: Exact
+    same: Hashable = None
 
 
 @dataclass(frozen=True)
@@ -56,14 +58,54 @@ def error_norms(parts: Sequence[Compared], threads: int = 1) -> Errors:
     The integrals use degree + 2 Gauss points a span and direction.
     """
     sums, has_gradient = np.zeros(4), True
-    for part in parts:
-        squares, known = _squares(*part, threads)
-        sums += part.space.total(squares)
-        has_gradient &= all(part.space.shared(known))
+    rules: dict[Any, GaussRule] = {}
+    stacked = [_stacked(part, rules, [degree + 2 for degree in part.space.degrees]) for part in parts]
+    for numbers, stack in stacks_of(stacked, threads):
+        own = [parts[number] for number in numbers]
+        squares, known = _squares(*own[0][:4], threads) if len(own) == 1 else _squares_of_stack(stack, own)
+        sums += stack.space.total(squares)
+        has_gradient &= all(stack.space.shared(known))
     l2, norm, seminorm, slope = np.sqrt(sums).tolist()
     if not has_gradient:
         return Errors(l2, ratio(l2, norm))
     return Errors(l2, ratio(l2, norm), seminorm, ratio(seminorm, slope))
+
+
+def _stacked(part: Compared, rules: dict[Any, GaussRule], counts: Sequence[int] | None = None) -> Stacked:
+    """Return a patch with the Gauss rule of `gauss_rule`, which is the same object for equal knots."""
+    space = part.space
+    key = tuple(row.tobytes() for row in (*space.whole.knots, *space.breaks)), space.degrees
+    if key not in rules:
+        rules[key] = gauss_rule(space, counts)
+    return Stacked(part.volume, space, rules[key], part.exact if part.same is None else part.same)
+
+
+def _squares_of_stack(stack: Stack, parts: Sequence[Compared]) -> tuple[Array, bool]:
+    """Return the sums of `_squares` over several patches of one shape."""
+    coefficients = np.stack([part.coefficients for part in parts])
+    sums, has_gradient = np.zeros((len(parts), stack.shape[0], 4)), []
+
+    def integrate(piece: Piece) -> None:
+        patches, _ = piece
+        shape = (len(patches), len(coefficients[0]))
+        fields, slopes = np.empty((*shape, 4, *stack.plane_shape)), np.empty((*shape, 3, *stack.plane_shape))
+        for q, rows, measure, x in stack.geometry(piece):
+            group_kernels.evaluate_splines(coefficients, patches, stack.kinds[patches], q, stack.tables, fields)
+            group_kernels.turn_fields(rows, fields[:, :, 1:], slopes, False)  # times the root of the measure
+            values, gradients = parts[patches[0]].exact(x)
+            size = np.abs(measure)[:, None]
+            exact = np.moveaxis(values.reshape(shape[1], -1, *stack.plane_shape), 1, 0)
+            found = [size * (exact - fields[:, :, 0]) ** 2, size * exact**2]
+            if gradients is not None:
+                grad = np.moveaxis(gradients.reshape(shape[1], 3, -1, *stack.plane_shape), 2, 0)
+                grad = grad * np.sqrt(size)[:, None]
+                found += [(grad - slopes) ** 2, grad**2]
+            has_gradient.append(gradients is not None)
+            for i, squares in enumerate(found):
+                sums[patches, q, i] = squares.reshape(len(patches), -1).sum(axis=1)
+
+    stack.on_pieces(integrate)
+    return sums.sum(axis=(0, 1)), all(has_gradient)
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,15 +179,24 @@ def ratio(error: float, size: float) -> float | None:
 def missing_mean(parts: Sequence[Compared]) -> float:
     """Return the constant to add to a solution of one component for the mean of the exact values."""
     lack = size = 0.0
-    for volume, space, coefficients, exact in parts:
-        rule = gauss_rule(space)
-        tables, spline = rule.tabulate(space.degrees, space.knots), np.ascontiguousarray(coefficients[0])
-        plane = np.empty((4, *rule.plane_shape))
-        here = of_one = 0.0
-        with space.agreed():
-            for q, _, measure, x in geometry_planes(volume, rule):
-                kernels.evaluate_plane(spline, q, tables, plane)
-                here += float(((exact(x)[0][0] - plane[0]) * np.abs(measure)).sum())
-                of_one += float(np.abs(measure).sum())
-        lack, size = lack + space.total(here), size + space.total(of_one)
+    rules: dict[Any, GaussRule] = {}
+    for numbers, stack in stacks_of([_stacked(part, rules) for part in parts], 1):
+        own = [parts[number] for number in numbers]
+        splines = np.stack([part.coefficients[:1] for part in own])
+        here, of_one = np.zeros((2, len(own), stack.shape[0]))
+
+        def integrate(piece: Piece) -> None:
+            patches, _ = piece
+            plane = np.empty((len(patches), 1, 4, *stack.plane_shape))  # noqa: B023  # called in this turn of the loop
+            for q, _, measure, x in stack.geometry(piece):  # noqa: B023
+                kinds, tables = stack.kinds[patches], stack.tables  # noqa: B023
+                group_kernels.evaluate_splines(splines, patches, kinds, q, tables, plane)  # noqa: B023
+                values = own[patches[0]].exact(x)[0][0].reshape(measure.shape)  # noqa: B023
+                weights = np.abs(measure)
+                here[patches, q] = ((values - plane[:, 0, 0]) * weights).sum(axis=(1, 2))  # noqa: B023
+                of_one[patches, q] = weights.sum(axis=(1, 2))  # noqa: B023
+
+        with stack.space.agreed():
+            stack.on_pieces(integrate)
+        lack, size = lack + stack.space.total(float(here.sum())), size + stack.space.total(float(of_one.sum()))
     return float(lack / size)

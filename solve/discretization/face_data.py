@@ -8,8 +8,9 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from parameterize.arrays import Array
-from parameterize.spline.bspline import apply_along, collocation, evaluate_grid
+from parameterize.spline.bspline import apply_along, collocation
 from parameterize.spline.interface import axis_side
+from parameterize.spline.patch_groups import groups_of
 from parameterize.spline.volume import FACE_NAMES, BSplineVolume
 
 from ..field import Points
@@ -38,6 +39,7 @@ def coefficients_of_patches(
     its rim.
     """
     coefficients = np.zeros((components, *space.shape, len(volumes)))
+    group = groups_of(volumes)[0] if len(volumes) > 1 else None
     points, bases, projections = zip(*map(_projection, space.knots, space.degrees), strict=True)
     for entity in sorted(product((0, 1, FREE), repeat=3), key=lambda entity: entity.count(FREE)):
         of = [FACE_NAMES[2 * axis + side] for axis, side in enumerate(entity) if side is not FREE]
@@ -45,28 +47,18 @@ def coefficients_of_patches(
         if not given:
             continue
         free = [a for a in range(3) if entity[a] is FREE]
-        rows = [points[a] if side is FREE else np.array([float(side)]) for a, side in enumerate(entity)]
+        u, v, w = (points[a] if side is FREE else np.array([float(side)]) for a, side in enumerate(entity))
         ends = [slice(None) if side is FREE else slice(-side, 1 - side or None) for side in entity]
         inside = [slice(1, -1) if side is FREE else end for side, end in zip(entity, ends, strict=True)]
         fixed = coefficients[:, *ends]  # on the closed entity: its own ends are known already
         for a in free:
             fixed = apply_along(bases[a], fixed, a + 1)
-        residual = values(_on_grid(volumes, rows), given[0]).reshape(fixed.shape) - fixed
+        x = Points.on(volumes[0], u, v, w) if group is None else np.moveaxis(group.grid(u, v, w), (-1, 0), (0, -1))
+        residual = values(x, given[0]).reshape(fixed.shape) - fixed
         for a in free:
             residual = np.moveaxis(np.tensordot(projections[a], residual, (1, a + 1)), 0, a + 1)
         coefficients[:, *inside] = residual
     return np.moveaxis(coefficients, -1, 0)
-
-
-def _on_grid(volumes: Sequence[BSplineVolume], rows: Sequence[Array]) -> Array:
-    """Return the points (3, .., k) of volumes of equal degrees and knots on a grid; (3, ..), with rows, of one."""
-    first, u, v, w = volumes[0], *rows
-    if len(volumes) == 1:
-        return Points.on(first, u, v, w)
-    is_rational = first.weights is not None
-    nets = np.stack([volume.homogeneous if is_rational else volume.control_points for volume in volumes], axis=3)
-    found = np.moveaxis(evaluate_grid(first.degrees, first.knots, nets, (u, v, w)), -1, 0)
-    return found[:3] / found[3:] if is_rational else found
 
 
 def _projection(knots: Array, degree: int) -> tuple[Array, csr_array, Array]:

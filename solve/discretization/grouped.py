@@ -3,9 +3,9 @@
 Their factors (q_u, .., q_w, q_v) are parts of an array (k, q_u, .., q_w, q_v), which compiled kernels pass.
 """
 
-from collections import defaultdict
 from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -19,7 +19,7 @@ from .groups import Layout, OnPatches
 from .operator import FaceTerm, Source, assemble_stack, multiply_law
 from .quadrature import GaussRule
 from .space import TrialSpace
-from .stack import Piece, Stack
+from .stack import Piece, Stack, Stacked, stacks_of
 
 
 class Law(NamedTuple):
@@ -95,12 +95,12 @@ class BodyMatrix:
             matrix.add_product(*groups[matrix.group])
         for patch in self.alone:
             result[patch][:] = self.parts[patch].apply(source[patch])
-        for patch, face in self._faces:
+        for patch, face in self._on_faces:
             face.add_product(source[patch], result[patch])
         return result
 
-    @property
-    def _faces(self) -> list[tuple[int, FaceTerm]]:
+    @cached_property
+    def _on_faces(self) -> list[tuple[int, FaceTerm]]:
         """Return the terms on faces of the patches in stacks, with the number of the patch."""
         alone = set(self.alone)
         return [(i, face) for i, own in enumerate(self.parts) if i not in alone for face in own.faces.values()]
@@ -125,9 +125,8 @@ def assemble_body(layout: Layout, laws: Sequence[Law], threads: int) -> tuple[Bo
     parts: list[Any] = [None] * len(laws)
     loads, stacks, alone = layout.empty(laws[0].form.components), [], []
     for number, (group, own_loads) in enumerate(zip(layout.groups, loads.in_groups, strict=True)):
-        for places in _stacks([laws[patch] for patch in group]):
+        for places, stack in stacks_of([_stacked(laws[patch]) for patch in group], threads):
             own = [laws[group[place]] for place in places]
-            stack = _stack_of(own, threads)
             forms, sources, component = [law.form for law in own], [law.source for law in own], own[0].component
             found, stored, own_loads[places] = assemble_stack(stack, forms, sources, component)
             for place, matrix in zip(places, found, strict=True):
@@ -141,26 +140,10 @@ def assemble_body(layout: Layout, laws: Sequence[Law], threads: int) -> tuple[Bo
     return BodyMatrix(layout, laws, parts, stacks, alone), loads
 
 
-def _stacks(laws: Sequence[Law]) -> list[list[int]]:
-    """Return the numbers of the laws of each stack, those with the same functions one after another."""
-    found: dict[Any, dict[Any, list[int]]] = defaultdict(lambda: defaultdict(list))
-    for number, (volume, _, rule, form, _, component, same) in enumerate(laws):
-        of_law = form.components, form.has_reaction, form.constant, component
-        key = volume.degrees, volume.shape, volume.weights is None, rule.shape, of_law
-        found[key][same].append(number)
-    return [[number for own in runs.values() for number in own] for runs in found.values()]
-
-
-def _stack_of(laws: Sequence[Law], threads: int) -> Stack:
-    """Return the stack of patches of one shape, in whose order equal laws follow each other."""
-    ends = [i for i in range(1, len(laws)) if laws[i].same != laws[i - 1].same]
-    return Stack(
-        [law.space for law in laws],
-        [law.rule for law in laws],
-        threads,
-        [law.volume for law in laws],
-        (0, *ends, len(laws)),
-    )
+def _stacked(law: Law) -> Stacked:
+    """Return a patch that is stacked with those whose laws store as much at a point."""
+    volume, space, rule, form, _, component, same = law
+    return Stacked(volume, space, rule, same, (form.components, form.has_reaction, form.constant, component))
 
 
 def law_of(form: Form) -> Array:

@@ -1,8 +1,8 @@
 """Defines the trial space: tensor-product splines on a volume's own knots, refined and raised in degree."""
 
 import math
-from collections import Counter
-from collections.abc import Collection
+from collections import Counter, defaultdict
+from collections.abc import Collection, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from typing import Any
@@ -11,6 +11,7 @@ import numpy as np
 
 from parameterize.arrays import Array, Knots
 from parameterize.spline.bspline import apply_along, breakpoints, halved, insertion_into
+from parameterize.spline.patch_groups import groups_of
 from parameterize.spline.volume import AXES, FACE_NAMES, BSplineVolume
 
 Window = tuple[slice, slice, slice]
@@ -238,11 +239,21 @@ def same_smoothness(knots: Array, old: int, new: int) -> Array:
 
 
 def longest_edge(volume: BSplineVolume, space: TrialSpace) -> float:
-    """Return h: the longest straight distance between neighbouring corners of an element, in the volume's units."""
-    u, v, w = space.breaks
-    longest = 0.0
-    for start in range(0, len(u) - 1, LAYERS):
-        corners = volume.grid(u[start : start + LAYERS + 1], v, w)  # (LAYERS + 1, e_v + 1, e_w + 1, 3)
-        edges = (np.diff(corners, axis=a) for a in range(3))
-        longest = max(longest, *(float(np.einsum("...i,...i->...", edge, edge).max()) for edge in edges))
-    return max(space.shared(longest**0.5))
+    """Return h of one patch, as `longest_edges` does."""
+    return longest_edges([volume], [space])
+
+
+def longest_edges(volumes: Sequence[BSplineVolume], spaces: Sequence[TrialSpace]) -> float:
+    """Return h: the longest straight distance between neighbouring corners of an element, in the volumes' units."""
+    longest, groups = 0.0, defaultdict(list)
+    for volume, space in zip(volumes, spaces, strict=True):
+        breaks = space.breaks
+        groups[volume.degrees, *(row.tobytes() for row in (*breaks, *volume.knots))].append((volume, breaks))
+    for members in groups.values():
+        own, (u, v, w) = [volume for volume, _ in members], members[0][1]
+        for group in groups_of(own):
+            for start in range(0, len(u) - 1, LAYERS):
+                corners = group.grid(u[start : start + LAYERS + 1], v, w)  # (k, LAYERS + 1, e_v + 1, e_w + 1, 3)
+                edges = (np.diff(corners, axis=a) for a in (1, 2, 3))
+                longest = max(longest, *(float(np.einsum("...i,...i->...", edge, edge).max()) for edge in edges))
+    return max(spaces[0].shared(longest**0.5))

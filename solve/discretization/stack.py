@@ -7,10 +7,11 @@ u. Sums over a patch have one order, whatever the number of threads.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections import defaultdict
+from collections.abc import Callable, Hashable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -30,6 +31,33 @@ LARGE = 2**13  # points of a patch from which on its planes are shared out
 POINTS = 2**12  # of a plane of several patches that are evaluated at once: their arrays fit into a processor's cache
 
 Piece = tuple[IntArray, IntArray]  # the numbers of some patches of a stack, and those of some points of u
+
+
+class Stacked(NamedTuple):
+    """State a patch that may be stacked with others.
+
+    same: equal for patches with the same law and data. shape: equal for patches that may be in one stack, beside equal
+    degrees and numbers of control points, functions and points.
+    """
+
+    volume: BSplineVolume
+    space: TrialSpace
+    rule: GaussRule
+    same: Hashable = None
+    shape: Hashable = None
+
+
+def stacks_of(patches: Sequence[Stacked], threads: int) -> Iterator[tuple[list[int], Stack]]:
+    """Yield the stacks of patches with the numbers of their patches, those with the same data one after another."""
+    found: dict[Any, dict[Any, list[int]]] = defaultdict(lambda: defaultdict(list))
+    for number, (volume, space, rule, same, shape) in enumerate(patches):
+        of_map = volume.degrees, volume.shape, volume.weights is None
+        found[of_map, space.degrees, space.shape, rule.shape, shape][same].append(number)
+    for runs in found.values():
+        numbers = [number for own in runs.values() for number in own]
+        ends = np.cumsum([0, *map(len, runs.values())]).tolist()
+        volumes, spaces, rules, _, _ = zip(*(patches[number] for number in numbers), strict=True)
+        yield numbers, Stack(spaces, rules, threads, volumes, ends)
 
 
 @dataclass(frozen=True, eq=False)
