@@ -7,6 +7,8 @@ from block_starts import double_torus, torus
 
 from parameterize.layouts.complex import Complex, spline_of
 from parameterize.layouts.planar.coons import coons_patch
+from parameterize.spline.interface import face_layer, orientations
+from parameterize.spline.volume import FACE_NAMES
 
 CUBE = np.stack(np.meshgrid(*[[0.0, 1.0]] * 3, indexing="ij"), axis=-1).transpose(2, 0, 1, 3)  # [w][u][v]
 BESIDE = CUBE + [1.0, 0.0, 0.0]
@@ -29,6 +31,30 @@ def test_faces_with_the_same_vertices_are_glued_in_any_turn():
     (interface,) = blocks.interfaces
     assert (interface.first, interface.second) == ((0, "u1"), (1, "v0")) and interface.flipped == (True, False)
     assert blocks.exposed.sum() == 10 and not blocks.exposed[0, 1] and not blocks.exposed[1, 2]
+
+
+def plain_interfaces(blocks):
+    """The faces with equal vertices, looked at one after the other."""
+    waiting = {}
+    for second in ((number, name) for number in range(len(blocks)) for name in FACE_NAMES):
+        vertices = face_layer(blocks.sections(second[0]), second[1])
+        key = tuple(sorted(vertices.ravel().tolist()))
+        if key not in waiting:
+            waiting[key] = second
+            continue
+        first = waiting.pop(key)
+        below = face_layer(blocks.sections(first[0]), first[1])
+        yield next(way for way in orientations(first, second) if np.array_equal(below, way.turned(vertices)))
+
+
+def test_a_block_of_turned_hexahedra_is_glued_as_by_a_plain_search():
+    numbers, rng = np.arange(64).reshape(4, 4, 4), np.random.default_rng(0)
+    cells = [numbers[i : i + 2, j : j + 2, k : k + 2] for i, j, k in np.ndindex(3, 3, 3)]
+    cells = [cell.transpose(np.roll(range(3), rng.integers(3)))[:: rng.choice([-1, 1])] for cell in cells]
+    points = np.stack(np.meshgrid(*[np.arange(4.0)] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
+    blocks = Complex(points, np.array(cells))
+    assert list(blocks.interfaces) == list(plain_interfaces(blocks)) and len(blocks.interfaces) == 54
+    assert len(spline_of(blocks, 2).body) == 27  # equal at interfaces
 
 
 def test_vertices_are_told_apart_by_number_alone():

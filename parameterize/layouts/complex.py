@@ -4,7 +4,8 @@ Rods along a skeleton, hexahedra between planes, blocks over outlines and stubs 
 makes the spline map of any of them.
 """
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections import defaultdict
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -17,6 +18,8 @@ from ..certificate.certify import certify
 from ..spline.body import Body
 from ..spline.bspline import greville, open_uniform_knots
 from ..spline.interface import Face, Interface, face_layer, orientations
+from ..spline.interface_rows import COLUMNS, face_numbers, interfaces_of
+from ..spline.patch_groups import groups_of
 from ..spline.spline_map import ControlNets, SplineMap, tied_spans
 from ..spline.volume import FACE_NAMES, BSplineVolume
 
@@ -73,20 +76,21 @@ class Complex:
     @cached_property
     def interfaces(self) -> tuple[Interface, ...]:
         """Return the pairs of faces that have the same vertices, each turned so that they lie on each other."""
-        return tuple(self._glued())
+        tables = defaultdict(list)
+        for numbers, sections in self._sections():
+            for face, name in enumerate(FACE_NAMES):
+                vertices = np.moveaxis(face_layer(np.moveaxis(sections, 0, 3), name), 2, 0)
+                tables[vertices.shape[1:]].append((len(FACE_NAMES) * numbers + face, vertices))
+        rows = [_glued(*map(np.concatenate, zip(*parts, strict=True))) for parts in tables.values()]
+        together = np.concatenate(rows)
+        return interfaces_of(together[np.argsort(face_numbers(together)[:, 1])])
 
-    def _glued(self) -> Iterator[Interface]:
-        waiting: dict[tuple[int, ...], Face] = {}
-        for number in range(len(self)):
-            for name in FACE_NAMES:
-                second, vertices = (number, name), face_layer(self.sections(number), name)
-                key = tuple(sorted(vertices.ravel().tolist()))
-                if key not in waiting:
-                    waiting[key] = second
-                    continue
-                first = waiting.pop(key)
-                below = face_layer(self.sections(first[0]), first[1])
-                yield next(way for way in orientations(first, second) if np.array_equal(below, way.turned(vertices)))
+    def _sections(self) -> Iterator[tuple[IntArray, IntArray]]:
+        """Yield the numbers (k,) of hexahedra with equally many sections, and the vertices (k, 2, 2, m) of these."""
+        straight = np.setdiff1d(np.arange(len(self)), list(self.bends))
+        yield straight, self.hexahedra[straight]
+        for number, vertices in self.bends.items():
+            yield np.array([number]), vertices[None]
 
     @cached_property
     def exposed(self) -> Mask:
@@ -159,6 +163,27 @@ class Complex:
         return Body(tuple(map(self.straight, range(len(self)))), self.interfaces)
 
 
+def _glued(faces: IntArray, vertices: IntArray) -> IntArray:
+    """Return the pairs of faces that have the same vertices as rows (k, 7), see interface_rows.py.
+
+    faces: (n,) numbers 6 * hexahedron + face. vertices: (n, a, b) of each. The second face has the larger number.
+    """
+    keys = np.sort(vertices.reshape(len(faces), -1), axis=1)
+    order = np.lexsort((faces, *keys.T))
+    alike = np.all(keys[order[1:]] == keys[order[:-1]], axis=1)
+    begins = np.maximum.accumulate(np.where(alike, 0, np.arange(1, len(order))))  # where the run of each face begins
+    pairs = 1 + np.flatnonzero((np.arange(1, len(order)) - begins) % 2 == 1)
+    first, second = order[pairs - 1], order[pairs]
+    rows = np.zeros((len(pairs), COLUMNS), dtype=np.int64)
+    rows[:, :2], rows[:, 2:4] = (np.stack(np.divmod(faces[own], len(FACE_NAMES)), axis=1) for own in (first, second))
+    below, above = (np.moveaxis(vertices[own], 0, 2) for own in (first, second))
+    for way in reversed(list(orientations((0, "u0"), (0, "u0")))):  # of several ways the first remains
+        turned = way.turned(above)
+        if turned.shape == below.shape:
+            rows[(turned == below).all(axis=(0, 1)), 4:] = way.swapped, *way.flipped
+    return rows
+
+
 class Vertices:
     """The points of a complex in the making."""
 
@@ -183,7 +208,9 @@ class Vertices:
 def spline_of(blocks: Complex, degree: int) -> SplineMap:
     """Return the map of a complex, equal at interfaces bit by bit, with uniform knots."""
     nets = blocks.nets(degree)
-    parts = [np.moveaxis(control_points(blocks, number, degree), -1, 0) for number in range(len(blocks))]
+    curved = {number: _ruled(blocks, number, degree) for number, name in blocks.surfaces if name == "w0"}
+    found = curved | _straight_nets(blocks, [number for number in range(len(blocks)) if number not in curved], degree)
+    parts = [np.moveaxis(found[number], -1, 0) for number in range(len(blocks))]
     return SplineMap(nets, nets.merged(nets.joined(parts)))
 
 
@@ -192,13 +219,36 @@ def control_points(blocks: Complex, number: int, degree: int) -> Array:
 
     Between two surfaces it is ruled; else they are its points at the Greville points of the knots.
     """
-    u, v, w = (greville(open_uniform_knots(degree + n, degree), degree) for n in blocks.spans[number].tolist())
     if (number, "w0") in blocks.surfaces:
-        low, high = (blocks.surfaces[number, name] for name in ("w0", "w1"))
-        share = w[:, None]
-        return np.asarray((1.0 - share) * low[:, :, None] + share * high[:, :, None])
-    places = np.stack(np.meshgrid(u, v, w, indexing="ij"), axis=-1)
-    return np.asarray(blocks.straight(number)(places.reshape(-1, 3)).reshape(places.shape))
+        return _ruled(blocks, number, degree)
+    return _straight_nets(blocks, [number], degree)[number]
+
+
+def _ruled(blocks: Complex, number: int, degree: int) -> Array:
+    """Return the control points (n_u, n_v, n_w, 3) of a hexahedron between two surfaces."""
+    low, high = (blocks.surfaces[number, name] for name in ("w0", "w1"))
+    share = _places(degree, blocks.spans[number, 2])[:, None]
+    return np.asarray((1.0 - share) * low[:, :, None] + share * high[:, :, None])
+
+
+def _straight_nets(blocks: Complex, numbers: Sequence[int], degree: int) -> dict[int, Array]:
+    """Return the control points (n_u, n_v, n_w, 3) of some hexahedra with straight pieces, by their numbers."""
+    found: dict[int, Array] = {}
+    for group in groups_of([blocks.straight(number) for number in numbers]):
+        own = np.asarray(numbers)[group.numbers]
+        kinds, labels = np.unique(blocks.spans[own], axis=0, return_inverse=True)
+        for label, spans in enumerate(kinds.tolist()):
+            grid = np.meshgrid(*(_places(degree, n) for n in spans), indexing="ij")
+            places, members = np.stack(grid, axis=-1), np.flatnonzero(labels.ravel() == label)
+            where = np.tile(places.reshape(-1, 3), (len(members), 1))
+            points = group.at(np.repeat(members, len(where) // len(members)), where)
+            found |= zip(own[members].tolist(), points.reshape(-1, *places.shape), strict=True)
+    return found
+
+
+def _places(degree: int, spans: int) -> Array:
+    """Return the Greville points of uniform knots."""
+    return greville(open_uniform_knots(degree + spans, degree), degree)
 
 
 def is_proved(body: Body) -> bool:
