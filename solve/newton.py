@@ -2,22 +2,22 @@
 
 import logging
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from numbers import Integral
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from parameterize.arrays import Array
+from parameterize.arrays import Array, Mask
 from parameterize.conjugate_gradients import INDEFINITE, conjugate_gradients
 from parameterize.old_names import takes_volume
 from parameterize.spline.body import Body, BodyLike, as_body
 from parameterize.threads import one_blas_thread
 
-from .assembly import assemble_data
+from .assembly import OnePatch, assemble_body_data
 from .diagnostics import ConvergenceError, judge
 from .discretization.error_norms import Compared, error_norms
+from .discretization.groups import OnPatches
 from .discretization.nonlinear import Forces, Tangent
 from .discretization.on_regions import demand_area
 from .discretization.space import longest_edges
@@ -29,7 +29,7 @@ from .forms.form import Form
 from .forms.problem import Problem
 from .linear.krylov import generalized_residuals
 from .options import SolveOptions
-from .patch_system import PatchProblem, scalar_operators
+from .patch_system import PatchProblem, operators_of
 from .solution import Solution, SolveReport
 from .solver import prepared
 from .system import coefficients_in, demand_fixed, field_of, preconditioners
@@ -128,9 +128,9 @@ def newton(
         )
     with one_blas_thread():
         balance = _Balance.of(glued, placed, patches, options, linear_iterations)
-        full = [np.zeros_like(load) for load in balance.loads]
+        full = 0.0 * balance.loads
         if start is not None:
-            full = coefficients_in(start, patches)
+            full = full.layout.joined(coefficients_in(start, patches))
         history: list[float] = []
         for step in range(1, load_steps + 1):
             full = balance.found(full, step / load_steps, history)
@@ -139,17 +139,17 @@ def newton(
 
 @dataclass(frozen=True, eq=False)
 class _Balance:
-    """Compare the forces of a law with the loads; coefficients are a list, (c, n_u, n_v, n_w) of each patch.
+    """Compare the forces of a law with the loads.
 
-    known: the coefficients that are given on faces. fixed: the masks of these coefficients.
+    known: the coefficients that are given on faces. fixed: the mask of these coefficients.
     """
 
     body: Body
     unknowns: Unknowns
-    forces: list[Forces]
-    loads: list[Array]
-    known: list[Array]
-    fixed: list[NDArray[np.bool_]]
+    forces: Forces
+    loads: OnPatches
+    known: OnPatches
+    fixed: Mask
     options: SolveOptions
     linear_iterations: int
 
@@ -161,36 +161,33 @@ class _Balance:
 
         linear_iterations: the largest number of iterations of the linear solver in a Newton step.
         """
-        forces, loads, known, operators, on_regions = [], [], [], [], list[WeakFace]()
-        for patch in patches:
-            simple: Any = _Loads(patch.problem)
-            operator, load, given = assemble_data(patch.volume, simple, patch.space, options)
-            forces.append(Forces.of(operator, patch.volume, patch.problem.form))
-            operators.append(scalar_operators(operator, len(load)))
-            loads.append(load)
-            known.append(given)
-            on_regions += [face for face in operator.faces.values() if isinstance(face, WeakFace)]
+        problems: list[Any] = [_Loads(patch.problem) for patch in patches]
+        simple = [OnePatch(own.volume, one, own.space) for own, one in zip(patches, problems, strict=True)]
+        matrix, loads, known = assemble_body_data(simple, options)
+        on_regions = [face for own in matrix.parts for face in own.faces.values() if isinstance(face, WeakFace)]
         demand_area(problem, on_regions, patches[0].space, body.patches)
-        for part in body.parts if len(body.parts) > 1 and not problem.form.has_reaction else ():
-            demand_fixed(part, [own for number in part for own in operators[number]])
+        if len(body.parts) > 1 and not problem.form.has_reaction:
+            operators = operators_of(matrix, loads.components)
+            for part in body.parts:
+                demand_fixed(part, [own for number in part for own in operators[number]])
         unknowns = unknowns_of([patch.space for patch in patches], body.interfaces)
-        free = unknowns.spread(np.ones((len(loads[0]), *unknowns.shape)))
-        known, fixed = unknowns.completed(known), [part == 0.0 for part in free]
-        return cls(body, unknowns, forces, loads, known, fixed, options, linear_iterations)
+        free = matrix.layout.joined(unknowns.spread(np.ones((loads.components, *unknowns.shape))))
+        known = matrix.layout.joined(unknowns.completed(known))
+        forces = Forces(matrix, [patch.problem.form for patch in patches])
+        return cls(body, unknowns, forces, loads, known, free.flat == 0.0, options, linear_iterations)
 
-    def found(self, full: list[Array], share: float, history: list[float]) -> list[Array]:
+    def found(self, full: OnPatches, share: float, history: list[float]) -> OnPatches:
         """Return the coefficients for which the forces balance a share of the loads, starting from `full`.
 
         The residuals are appended to the history. Raises ConvergenceError.
         """
-        loads, made = [share * load for load in self.loads], 0
-        inner = self._inner(full)
-        if not all(np.isfinite(part).all() for part in inner):
+        loads, known, made = share * self.loads, share * self.known, 0
+        inner = self.forces.apply(full)
+        if not np.isfinite(inner.flat).all():
             raise ConvergenceError("newton: the law gives no finite forces at the start; give another one in start")
         while True:
-            parts = zip(self.fixed, self.known, full, strict=True)
-            missing = [np.where(fixed, share * known - own, 0.0) for fixed, known, own in parts]
-            rest = _less(inner, loads)
+            missing = replace(full, flat=np.where(self.fixed, known.flat - full.flat, 0.0))
+            rest = inner - loads
             size = sum(float(np.linalg.norm(self.unknowns.assembled(forces))) for forces in (inner, loads))
             history.append(float(np.linalg.norm(self.unknowns.collect(rest))) / size if size else 0.0)
             log.info("share %.3g of the loads, step %d: residual %.1e", share, made, history[-1])
@@ -205,32 +202,23 @@ class _Balance:
                 raise ConvergenceError(_failed(history, "and no step lowers it"))
             (full, inner), made = searched, made + 1
 
-    def _inner(self, full: Sequence[Array]) -> list[Array]:
-        """Return the forces of the law on each patch."""
-        return [forces.apply(own) for forces, own in zip(self.forces, full, strict=True)]
-
-    def _step(
-        self, full: Sequence[Array], rest: Sequence[Array], missing: Sequence[Array], residual: float
-    ) -> list[Array]:
+    def _step(self, full: OnPatches, rest: OnPatches, missing: OnPatches, residual: float) -> OnPatches:
         """Return Newton's step, after which the coefficients on faces have their given values."""
-        tangents = [forces.derivative(own) for forces, own in zip(self.forces, full, strict=True)]
-        form = self.forces[0].form
-        if form.symmetric and not all(tangent.is_symmetric for tangent in tangents):
+        tangent = self.forces.derivative(full)
+        form = self.forces.forms[0]
+        if form.symmetric and not tangent.is_symmetric:
             raise ValueError(f"{type(form).__name__} has a derivative that is not symmetric: set `symmetric = False`")
-        parts = zip(rest, tangents, missing, strict=True)
-        right = -self.unknowns.collect([own + tangent.apply(given) for own, tangent, given in parts])
-        free = self._solved(tangents, right, form.symmetric, float(np.clip(residual, *INNER)))
-        return [given + own for given, own in zip(missing, self.unknowns.spread(free), strict=True)]
+        right = -self.unknowns.collect(rest + tangent.apply(missing))
+        free = self._solved(tangent, right, form.symmetric, float(np.clip(residual, *INNER)))
+        return missing + rest.layout.joined(self.unknowns.spread(free))
 
-    def _solved(self, tangents: Sequence[Tangent], right: Array, is_symmetric: bool, tolerance: float) -> Array:
+    def _solved(self, tangent: Tangent, right: Array, is_symmetric: bool, tolerance: float) -> Array:
         """Return the solution of a linear system, by GMRES where the matrix is not definite."""
-        components = range(len(right))
-        operators = [[tangent.block(i) for i in components] for tangent in tangents]
-        inverses = preconditioners(self.unknowns, operators, self.body.interfaces)
+        operators = list(zip(*(tangent.block(i) for i in range(len(right))), strict=True))
+        inverses, joined = preconditioners(self.unknowns, operators, self.body.interfaces), self.loads.layout.joined
 
         def product(x: Array) -> Array:
-            spread = zip(tangents, self.unknowns.spread(x), strict=True)
-            return self.unknowns.collect([tangent.apply(own) for tangent, own in spread])
+            return self.unknowns.collect(tangent.apply(joined(self.unknowns.spread(x))))
 
         def precondition(residual: Array) -> Array:
             return np.stack([inverse(part) for inverse, part in zip(inverses, residual, strict=True)])
@@ -242,41 +230,33 @@ class _Balance:
 
     def _searched(
         self,
-        full: Sequence[Array],
-        step: Sequence[Array],
-        inner: Sequence[Array],
-        loads: Sequence[Array],
+        full: OnPatches,
+        step: OnPatches,
+        inner: OnPatches,
+        loads: OnPatches,
         is_reached: bool,
-    ) -> tuple[list[Array], list[Array]] | None:
+    ) -> tuple[OnPatches, OnPatches] | None:
         """Return the coefficients after the step or a part of it, and the forces there; None where no part is accepted.
 
         A part is accepted where the forces along the step fall below a share of their earlier size, or where all forces
         become smaller; after a step that also changes coefficients on faces (not `is_reached`), finite forces suffice.
         """
-        rest, along = self._unbalanced(inner, loads), self.unknowns.chosen(step).ravel()
+        rest, along = self.unknowns.collect(inner - loads).ravel(), self.unknowns.chosen(step).ravel()
         before, size = ENOUGH * abs(float(rest @ along)), float(np.linalg.norm(rest))
         length = 1.0
         while length >= SHORTEST:
-            new = [own + length * change for own, change in zip(full, step, strict=True)]
-            forces = self._inner(new)
-            left = self._unbalanced(forces, loads)
+            new = full + length * step
+            forces = self.forces.apply(new)
+            left = self.unknowns.collect(forces - loads).ravel()
             work, norm = abs(float(left @ along)), float(np.linalg.norm(left))
             if np.isfinite(norm) and (not is_reached or work <= before or norm < size):
                 return new, forces
             length *= 0.5
         return None
 
-    def _unbalanced(self, inner: Sequence[Array], loads: Sequence[Array]) -> Array:
-        """Return the forces (N,) of the unknowns that the loads do not balance."""
-        return self.unknowns.collect(_less(inner, loads)).ravel()
 
-
-def _less(inner: Sequence[Array], loads: Sequence[Array]) -> list[Array]:
-    return [force - load for force, load in zip(inner, loads, strict=True)]
-
-
-def _largest(parts: Sequence[Array]) -> float:
-    return max(float(np.abs(part).max(initial=0.0)) for part in parts)
+def _largest(values: OnPatches) -> float:
+    return float(np.abs(values.flat).max(initial=0.0))
 
 
 class _Loads:
@@ -310,7 +290,7 @@ def _solution(
     body: Body,
     problem: BoundaryValueProblem,
     patches: Sequence[PatchProblem],
-    full: Sequence[Array],
+    full: OnPatches,
     balance: _Balance,
     history: list[float],
     more: int,
@@ -320,7 +300,7 @@ def _solution(
     if problem.exact is not None:
         rows = zip(patches, full, strict=True)
         parts = [Compared(patch.volume, patch.space, own, patch.problem.exact_at) for patch, own in rows]
-        errors = error_norms(parts, balance.forces[0].threads)
+        errors = error_norms(parts, balance.options.thread_count)
     dofs = len(full[0]) * balance.unknowns.count
     doubtful, meaningful = judge(problem, patches, errors, None, dofs)
     report = SolveReport(

@@ -9,6 +9,7 @@ from parameterize.arrays import Array
 from parameterize.spline.volume import BSplineVolume
 
 from .assembly import Assembled
+from .discretization.grouped import BodyMatrix
 from .discretization.operator import FormOperator, Operator
 from .discretization.space import TrialSpace
 from .discretization.weak import WeakFace
@@ -50,10 +51,8 @@ class PatchSystem(PatchProblem):
 
 def systems_of(patches: Sequence[PatchProblem], found: Assembled) -> tuple[PatchSystem, ...]:
     """Return the systems of all patches from what is assembled on them."""
-    matrix, components = found.matrix, found.loads.components
-    is_scalar = isinstance(matrix.parts[0], Operator)
-    each = [matrix.parts] if is_scalar else [matrix.block(i).parts for i in range(components)]
-    rows = zip(patches, matrix.parts, found.loads, found.known, zip(*each, strict=True), strict=True)
+    operators = operators_of(found.matrix, found.loads.components)
+    rows = zip(patches, found.matrix.parts, found.loads, found.known, operators, strict=True)
     return tuple(
         PatchSystem(
             patch.volume,
@@ -62,12 +61,14 @@ def systems_of(patches: Sequence[PatchProblem], found: Assembled) -> tuple[Patch
             matrix=own,
             known=known,
             loads=loads,
-            operators=operators,
+            operators=scalar,
         )
-        for patch, own, loads, known, operators in rows
+        for patch, own, loads, known, scalar in rows
     )
 
 
-def scalar_operators(matrix: Operator | FormOperator, components: int) -> tuple[Operator, ...]:
-    """Return the scalar operator of each component, a single one where it serves all."""
-    return (matrix,) if isinstance(matrix, Operator) else tuple(map(matrix.block, range(components)))
+def operators_of(matrix: BodyMatrix, components: int) -> list[tuple[Operator, ...]]:
+    """Return for each patch the scalar operator of each component, a single one where it serves all."""
+    is_scalar = isinstance(matrix.parts[0], Operator)
+    each = [matrix.parts] if is_scalar else [matrix.block(i).parts for i in range(components)]
+    return list(zip(*each, strict=True))

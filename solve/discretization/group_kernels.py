@@ -157,6 +157,47 @@ def multiply_laws(
 
 
 @compiled
+def multiply_tangents(
+    coefficients: Array,
+    places: IntArray,
+    patches: IntArray,
+    points: IntArray,
+    kinds: IntArray,
+    tables: Tables,
+    factors: Array,
+    has_value: bool,
+    result: Array,
+) -> None:
+    """Add the part of some patches and points of u to products of tangents and coefficients of a group.
+
+    Arguments as in `multiply_patches`. factors: (k, q_u, c, 4, c, 4, q_w, q_v), from a value and its gradient to both.
+    has_value: whether the products have a value.
+    """
+    count, plane = coefficients.shape[1], factors.shape[6:]
+    fields, found = np.empty((count, 4, *plane)), np.empty((count, 4, *plane))
+    for i in patches:
+        source, total, own = coefficients[places[i]], result[places[i]], of_kind(tables, kinds[i])
+        for point in points:
+            for c in range(count):
+                evaluate_plane(source[c], point, own, fields[c])
+            apply_at_points(factors[i, point], fields, found)
+            for c in range(count):
+                spread_plane(found[c], point, own, has_value, total[c])
+
+
+@compiled
+def apply_at_points(factors: Array, fields: Array, result: Array) -> None:
+    """Write the products of matrices (c, 4, c, 4, q_w, q_v) and fields (c, 4, q_w, q_v) to a result of that shape."""
+    count = fields.shape[0] * fields.shape[1]
+    source, total, matrix = fields.reshape(count, -1), result.reshape(count, -1), factors.reshape(count, count, -1)
+    for i in range(count):
+        total[i] = 0.0
+        for j in range(count):
+            for m in range(total.shape[1]):
+                total[i, m] += matrix[i, j, m] * source[j, m]
+
+
+@compiled
 def apply_law(law: Array, gradient: Array, flux: Array) -> None:
     """Write a law's flux (c, 3, q_w, q_v) of a gradient of that shape, with its matrix (c, 3, c, 3)."""
     count = law.shape[0] * law.shape[1]

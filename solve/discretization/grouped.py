@@ -3,7 +3,7 @@
 Their factors (q_u, .., q_w, q_v) are parts of an array (k, q_u, .., q_w, q_v), which compiled kernels pass.
 """
 
-from collections.abc import Hashable, Sequence
+from collections.abc import Collection, Hashable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -95,15 +95,27 @@ class BodyMatrix:
             matrix.add_product(*groups[matrix.group])
         for patch in self.alone:
             result[patch][:] = self.parts[patch].apply(source[patch])
-        for patch, face in self._on_faces:
-            face.add_product(source[patch], result[patch])
+        self.add_faces(source, result, self.alone)
         return result
 
+    def add_faces(self, coefficients: OnPatches, result: OnPatches, left_out: Collection[int] = ()) -> None:
+        """Add the products of the terms on faces, but those of some patches, to a result."""
+        for patch, face in self._faces:
+            if patch not in left_out:
+                face.add_product(coefficients[patch], result[patch])
+
     @cached_property
-    def _on_faces(self) -> list[tuple[int, FaceTerm]]:
-        """Return the terms on faces of the patches in stacks, with the number of the patch."""
-        alone = set(self.alone)
-        return [(i, face) for i, own in enumerate(self.parts) if i not in alone for face in own.faces.values()]
+    def _faces(self) -> list[tuple[int, FaceTerm]]:
+        """Return the terms on faces with the number of the patch."""
+        return [(i, face) for i, own in enumerate(self.parts) for face in own.faces.values()]
+
+    @property
+    def every_stack(self) -> list[tuple[Stack, int, IntArray]]:
+        """Return the stacks of all patches, with the number of the group and the places in it, one patch alone too."""
+        threads = self.parts[0].threads
+        groups = [[_stacked(self.laws[patch]) for patch in group] for group in self.layout.groups]
+        each = [(k, one) for k, group in enumerate(groups) for one in stacks_of(group, threads)]
+        return [(stack, k, np.array(places)) for k, (places, stack) in each]
 
     def with_faces(self, faces: Sequence[dict[str, Any]]) -> "BodyMatrix":
         """Return the same matrix with terms on faces of each patch."""

@@ -1,102 +1,170 @@
 """Computes the forces of a law that is not linear, and their derivative, a matrix stored at the quadrature points."""
 
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from parameterize.arrays import Array, IntArray
-from parameterize.spline.volume import BSplineVolume
 
+from ..field import Points
 from ..forms.form import ROUNDING, Form, reaction
 from ..forms.jets import PAIRS
 from ..forms.tangent import derivative
-from . import kernels
-from .operator import FormOperator, MatrixFree, Operator
-from .quadrature import geometry_planes
+from . import group_kernels
+from .grouped import BodyMatrix
+from .groups import OnPatches
+from .operator import Operator
+from .stack import Piece, Stack, of_law, of_patches
 
 
 @dataclass(frozen=True, eq=False)
-class Forces(MatrixFree):
-    """Compute the integrals of flux : grad v + react . v of any law, with Robin's term; `apply` takes coefficients."""
+class StackForces:
+    """Compute the forces of any law on the patches of a stack.
 
-    volume: BSplineVolume
-    form: Form
-
-    @classmethod
-    def of(cls, operator: Operator | FormOperator, volume: BSplineVolume, form: Form) -> "Forces":
-        """Return the forces of a law with the quadrature rule and the terms on faces of an operator."""
-        return cls(operator.space, operator.rule, operator.threads, volume, form, faces=operator.faces)
-
-    def _multiply(self, points: IntArray, coefficients: Array, result: Array) -> None:
-        for q, rows, measure, x in geometry_planes(self.volume, self.rule, points):
-            size = np.abs(measure)
-            scale = np.sqrt(size)
-            fields, gradient = self._plane(q, rows, scale, coefficients)
-            with np.errstate(all="ignore"):  # a step may go too far: whoever makes it looks at the result
-                flux = np.asarray(self.form.flux(fields[:, 0], gradient, x), dtype=np.float64) * scale
-                fields[:, 0] = reaction(self.form, fields[:, 0], gradient, x) * size
-            kernels.turn(rows, np.ascontiguousarray(flux), fields[:, 1:], True)
-            for plane, total in zip(fields, result, strict=True):
-                kernels.spread_plane(plane, q, self.tables, self.form.has_reaction, total)
-
-    def _plane(self, q: int, rows: Array, scale: Array, coefficients: Array) -> tuple[Array, Array]:
-        """Return values and parametric derivatives (c, 4, q_w, q_v) of a plane, and gradients (c, 3, q_w, q_v)."""
-        fields = np.empty((len(coefficients), 4, *self.rule.plane_shape))
-        for component, plane in zip(coefficients, fields, strict=True):
-            kernels.evaluate_plane(component, q, self.tables, plane)
-        gradient = np.empty((len(coefficients), 3, *self.rule.plane_shape))
-        kernels.turn(rows, fields[:, 1:], gradient, False)
-        return fields, gradient / scale
-
-    def derivative(self, coefficients: Array) -> "Tangent":
-        """Return the derivative at coefficients (c, n_u, n_v, n_w). Raises ValueError as `tangent.derivative` does."""
-        c, (q_u, *plane) = len(coefficients), (self.rule.shape[0], *self.rule.plane_shape)
-        factors, source = np.empty((q_u, c, 4, c, 4, *plane)), np.ascontiguousarray(coefficients)
-
-        def fill(points: IntArray) -> None:
-            for q, rows, measure, x in geometry_planes(self.volume, self.rule, points):
-                scale = np.sqrt(np.abs(measure))
-                fields, gradient = self._plane(q, rows, scale, source)
-                pull = np.zeros((4, 4, *plane))  # from u and its parametric derivatives to u and its gradient
-                pull[0, 0], pull[1:, 1:] = scale, rows
-                law = derivative(self.form, fields[:, 0], gradient, np.asarray(x))
-                half = np.einsum("cidjwv,bjwv->cidbwv", law, pull)
-                factors[q] = np.einsum("aiwv,cidbwv->cadbwv", pull, half)
-
-        self.on_planes(fill)
-        return Tangent(self.space, self.rule, self.threads, factors, self.form.has_reaction, faces=self.faces)
-
-
-@dataclass(frozen=True, eq=False)
-class Tangent(MatrixFree):
-    """Apply the derivative of forces.
-
-    factors: (q_u, c, 4, c, 4, q_w, q_v), the derivatives with respect to u and its parametric derivatives, with
-    weights. has_reaction: whether the first of the four entries is used.
+    group: the number of the group that the patches belong to. places: (k,), their places in it. forms: the law of each
+    patch.
     """
 
-    factors: Array
-    has_reaction: bool
+    stack: Stack
+    group: int
+    places: IntArray
+    forms: Sequence[Form]
+
+    def add(self, coefficients: Array, result: Array) -> None:
+        """Add the forces for coefficients (patches, c, n_u, n_v, n_w) of the group to a result of that shape."""
+
+        def add(piece: Piece) -> None:
+            patches, _ = piece
+            form, where = self.forms[patches[0]], (self.places[patches], self.stack.kinds[patches])
+            for q, rows, size, fields, gradient, x in self._planes(piece, coefficients):
+                u, grad, scale = of_law(fields[:, :, 0]), of_law(gradient), np.sqrt(size)
+                with np.errstate(all="ignore"):  # a step may go too far: whoever makes it looks at the result
+                    flux = of_patches(np.asarray(form.flux(u, grad, x), dtype=np.float64), size) * scale[:, None, None]
+                    fields[:, :, 0] = of_patches(reaction(form, u, grad, x), size) * size[:, None]
+                group_kernels.turn_fields(rows, np.ascontiguousarray(flux), fields[:, :, 1:], True)
+                group_kernels.spread_splines(fields, *where, q, self.stack.tables, form.has_reaction, result)
+
+        self.stack.on_pieces(add)
+
+    def derivative(self, coefficients: Array) -> Array:
+        """Return the derivative (k, q_u, c, 4, c, 4, q_w, q_v) with respect to u and its parametric derivatives.
+
+        It has the weights of the points. Raises ValueError as `tangent.derivative` does.
+        """
+        c, (q_u, *plane) = coefficients.shape[1], (self.stack.shape[0], *self.stack.plane_shape)
+        factors = np.empty((len(self.stack), q_u, c, 4, c, 4, *plane))
+
+        def fill(piece: Piece) -> None:
+            patches, _ = piece
+            for q, rows, size, fields, gradient, x in self._planes(piece, coefficients):
+                pull = np.zeros((len(patches), 4, 4, *plane))  # from u and its parametric derivatives to u and gradient
+                pull[:, 0, 0], pull[:, 1:, 1:] = np.sqrt(size), rows
+                law = derivative(self.forms[patches[0]], of_law(fields[:, :, 0]), of_law(gradient), np.asarray(x))
+                half = np.einsum("mcidjwv,mbjwv->mcidbwv", of_patches(law, size), pull)
+                factors[patches, q] = np.einsum("maiwv,mcidbwv->mcadbwv", pull, half)
+
+        self.stack.on_pieces(fill)
+        return factors
+
+    def _planes(self, piece: Piece, source: Array) -> Iterator[tuple[int, Array, Array, Array, Array, Points]]:
+        """Yield for every point q of u: q, rows R, w |det J|, fields, gradients, and the points in space.
+
+        R and w |det J| are those of `Stack.geometry`. Fields (m, c, 4, q_w, q_v) are u and its parametric derivatives,
+        gradients are (m, c, 3, q_w, q_v).
+        """
+        patches, _ = piece
+        which, kinds = self.places[patches], self.stack.kinds[patches]
+        fields = np.empty((len(patches), source.shape[1], 4, *self.stack.plane_shape))
+        gradient = np.empty((len(patches), source.shape[1], 3, *self.stack.plane_shape))
+        for q, rows, measure, x in self.stack.geometry(piece):
+            group_kernels.evaluate_splines(source, which, kinds, q, self.stack.tables, fields)
+            group_kernels.turn_fields(rows, fields[:, :, 1:], gradient, False)
+            size = np.abs(measure)
+            yield q, rows, size, fields, gradient / np.sqrt(size)[:, None, None], x
+
+
+@dataclass(frozen=True, eq=False)
+class Forces:
+    """Compute the integrals of flux : grad v + react . v of any law on all patches, with the terms on faces.
+
+    matrix: of a simple law, whose stacks, rules and terms on faces are used. forms: the law of each patch.
+    """
+
+    matrix: BodyMatrix
+    forms: Sequence[Form]
+
+    @cached_property
+    def stacks(self) -> list[StackForces]:
+        """Return the forces on each stack."""
+        groups = self.matrix.layout.groups
+        return [
+            StackForces(stack, number, places, [self.forms[groups[number][i]] for i in places])
+            for stack, number, places in self.matrix.every_stack
+        ]
+
+    def apply(self, coefficients: OnPatches) -> OnPatches:
+        """Return the forces for all coefficients."""
+        result = self.matrix.layout.empty(coefficients.components)
+        groups = list(zip(coefficients.in_groups, result.in_groups, strict=True))
+        for own in self.stacks:
+            own.add(*groups[own.group])
+        self.matrix.add_faces(coefficients, result)
+        return result
+
+    def derivative(self, coefficients: OnPatches) -> "Tangent":
+        """Return the derivative at some coefficients. Raises ValueError as `tangent.derivative` does."""
+        groups = list(coefficients.in_groups)
+        return Tangent(self, [own.derivative(groups[own.group]) for own in self.stacks])
+
+
+@dataclass(frozen=True, eq=False)
+class Tangent:
+    """Apply the derivative of forces. factors: those of `StackForces.derivative` of each stack."""
+
+    forces: Forces
+    factors: Sequence[Array]
 
     @property
     def is_symmetric(self) -> bool:
-        """Return whether the matrix is its own transpose, tested on the plane in the middle."""
-        middle = self.factors[len(self.factors) // 2]
-        return bool(np.abs(middle - middle.transpose(2, 3, 0, 1, 4, 5)).max() <= ROUNDING * np.abs(middle).max())
+        """Return whether the matrix is its own transpose, tested on the planes in the middle."""
+        middles = [factors[:, factors.shape[1] // 2] for factors in self.factors]
+        return all(
+            np.abs(own - own.transpose(0, 3, 4, 1, 2, 5, 6)).max() <= ROUNDING * np.abs(own).max() for own in middles
+        )
 
-    def _multiply(self, points: IntArray, coefficients: Array, result: Array) -> None:
-        fields = np.empty((len(coefficients), 4, *self.rule.plane_shape))
-        for q in points:
-            for component, plane in zip(coefficients, fields, strict=True):
-                kernels.evaluate_plane(component, q, self.tables, plane)
-            found = np.einsum("cadbwv,dbwv->cawv", self.factors[q], fields)
-            for plane, total in zip(found, result, strict=True):
-                kernels.spread_plane(plane, q, self.tables, self.has_reaction, total)
+    def apply(self, coefficients: OnPatches) -> OnPatches:
+        """Return the products with all coefficients."""
+        matrix = self.forces.matrix
+        result = matrix.layout.empty(coefficients.components)
+        groups = list(zip(coefficients.in_groups, result.in_groups, strict=True))
+        for own, factors in zip(self.forces.stacks, self.factors, strict=True):
+            _add_products(own, factors, *groups[own.group])
+        matrix.add_faces(coefficients, result)
+        return result
 
-    def block(self, component: int) -> Operator:
-        """Return the symmetric part of a component's diagonal block, for its own gradient and value."""
-        own = self.factors[:, component, :, component]
-        entries = [0.5 * (own[:, 1 + i, 1 + j] + own[:, 1 + j, 1 + i]) for i, j in PAIRS]
-        entries += [np.maximum(own[:, 0, 0], 0.0)] if self.has_reaction else []
-        whole = Operator(self.space, self.rule, self.threads, np.ascontiguousarray(np.stack(entries, axis=1)))
-        return replace(whole, faces=self.faces)
+    def block(self, component: int) -> list[Operator]:
+        """Return the symmetric part of a component's diagonal block on each patch, for its own gradient and value."""
+        matrix, found = self.forces.matrix, dict[int, Array]()
+        for stack, factors in zip(self.forces.stacks, self.factors, strict=True):
+            own = factors[:, :, component, :, component]
+            entries = [0.5 * (own[:, :, 1 + i, 1 + j] + own[:, :, 1 + j, 1 + i]) for i, j in PAIRS]
+            entries += [np.maximum(own[:, :, 0, 0], 0.0)] if stack.forms[0].has_reaction else []
+            numbers = [matrix.layout.groups[stack.group][i] for i in stack.places]
+            found.update(zip(numbers, np.stack(entries, axis=2), strict=True))
+        return [
+            Operator(part.space, part.rule, part.threads, found[number], component, faces=part.faces)
+            for number, part in enumerate(matrix.parts)
+        ]
+
+
+def _add_products(own: StackForces, factors: Array, coefficients: Array, result: Array) -> None:
+    """Add the products of a tangent and coefficients (patches, c, n_u, n_v, n_w) of a group to a result."""
+    stack, has_value = own.stack, own.forms[0].has_reaction
+
+    def add(piece: Piece) -> None:
+        where = own.places, *piece, stack.kinds, stack.tables, factors, has_value
+        group_kernels.multiply_tangents(coefficients, *where, result)
+
+    stack.on_pieces(add)

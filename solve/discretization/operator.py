@@ -22,7 +22,7 @@ from ..forms.form import Form, reaction
 from . import group_kernels, kernels
 from .quadrature import GaussRule, operator_rule
 from .space import TrialSpace
-from .stack import Piece, Stack, colours
+from .stack import Piece, Stack, colours, of_law, of_patches
 from .unknowns import Window
 
 Source = Callable[[Array], Array]
@@ -297,16 +297,13 @@ def multiply_law(
     for q, rows, measure, x in planes:
         group_kernels.evaluate_splines(coefficients, which, kinds, q, stack.tables, fields)
         group_kernels.turn_fields(rows, fields[:, :, 1:], gradient, False)
-        values, slopes = fields[:, :, 0], gradient
-        values, slopes = (part[0] if count == 1 else np.moveaxis(part, 0, -3) for part in (values, slopes))
+        values, slopes = of_law(fields[:, :, 0]), of_law(gradient)
         if measure is not None:
             scale = np.sqrt(np.abs(measure))
             scale = scale[0] if count == 1 else scale
             values = values * scale
-            react = reaction(form, values, slopes, x) * scale
-            fields[:, :, 0] = np.moveaxis(react.reshape(len(react), *measure.shape), 1, 0)
-        flux = np.asarray(form.flux(values, slopes, x), dtype=np.float64)
-        flux = np.moveaxis(flux.reshape(*flux.shape[:2], count, *stack.plane_shape), 2, 0)
+            fields[:, :, 0] = of_patches(reaction(form, values, slopes, x) * scale, measure)
+        flux = of_patches(np.asarray(form.flux(values, slopes, x), dtype=np.float64), fields[:, 0, 0])
         group_kernels.turn_fields(rows, np.ascontiguousarray(flux), fields[:, :, 1:], True)
         group_kernels.spread_splines(fields, which, kinds, q, stack.tables, form.has_reaction, result)
 

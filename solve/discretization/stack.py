@@ -235,6 +235,17 @@ class Stack:
         return result[:, 0]
 
 
+def of_law(fields: Array) -> Array:
+    """Return fields (m, c, .., q_w, q_v) of m patches as a law takes them: (c, .., m, q_w, q_v), for one without m."""
+    return fields[0] if len(fields) == 1 else np.moveaxis(fields, 0, -3)
+
+
+def of_patches(found: Array, measure: Array) -> Array:
+    """Return what a law gives for fields of `of_law` as (m, c, .., q_w, q_v); measure: (m, q_w, q_v)."""
+    lead = found.shape[: found.ndim - 2 - (len(measure) > 1)]
+    return np.moveaxis(found.reshape(*lead, *measure.shape), -3, 0)
+
+
 def _joined(tables: Sequence[kernels.Tables]) -> kernels.Tables:
     """Return tables with a leading dimension."""
     u, v, w = (
