@@ -54,3 +54,10 @@ def test_the_certificates_of_a_mixed_body_are_those_of_its_patches(max_depth, at
         assert found.mean_det == pytest.approx(alone.mean_det, rel=1e-10)
         assert (found.witness, found.flat) == (alone.witness, alone.flat)
         np.testing.assert_array_equal(found.unproved, alone.unproved)
+
+
+def test_of_many_defects_the_first_are_printed():
+    thin = replace(benchmark_volume(2), control_points=benchmark_volume(2).control_points * [1.0, 1.0, 0.0])
+    found = certify(Body((thin,) * 8), max_depth=0)
+    assert len(found.defects) == 8
+    assert str(found).startswith("undecided: p0: ") and str(found).endswith("; and 3 more") and "p5" not in str(found)

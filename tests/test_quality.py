@@ -15,8 +15,8 @@ from parameterize.certificate.boundary import check_boundary
 from parameterize.certificate.certify import certify
 from parameterize.cube.boundary_map import BoundaryMap
 from parameterize.quality.distances import Distances, nearest_on_boundary, two_sided
-from parameterize.quality.distortion import arap_grid
-from parameterize.quality.quality import measure
+from parameterize.quality.distortion import BoxDistortion, Distortion, arap_grid
+from parameterize.quality.quality import MOST_LINES, _lines_of, measure
 from parameterize.spline.body import Body
 from parameterize.spline.bspline import collocation, greville, open_uniform_knots
 from parameterize.spline.sampled_boundary import SampledBoundary
@@ -282,3 +282,11 @@ def test_nearest_places_on_edges_do_not_leave_the_cube_by_rounding():
     places[rows, rows % 3], places[rows, (rows + 1) % 3] = np.round(places[rows, rows % 3]), 1.0
     found = nearest_on_boundary(volume(places), volume, SampledBoundary.of(volume))[1]
     assert found.min() == 0.0 and found.max() == 1.0
+
+
+def test_of_many_patches_the_most_distorted_are_printed():
+    patches = [BoxDistortion((1.0, 1.0, 1.0), 1.0, Distortion(0.0, float(number)), 1.0, 27) for number in range(50)]
+    lines = _lines_of(patches)
+    assert [line.split()[0] for line in lines[1:-1]] == [f"p{number}" for number in range(50 - MOST_LINES, 50)]
+    assert lines[-1].strip() == f"the {50 - MOST_LINES} other patches are less distorted"
+    assert len(_lines_of(patches[:3])) == 4 and _lines_of([]) == []

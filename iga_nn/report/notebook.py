@@ -73,7 +73,9 @@ def _certificate(certificate: Certificate) -> str:
     facts = [("volume", f"{certificate.volume:.6g}")]
     if certificate.verdict == "certified":
         facts.append(("|det J| is at least", f"{certificate.lower_bound:.3g} of its mean"))
-    return _table(f"{len(certificate.patches)} patches: {certificate.verdict}", facts, notices=certificate.defects)
+    return _table(
+        f"{len(certificate.patches)} patches: {certificate.verdict}", facts, notices=certificate.first_defects
+    )
 
 
 def _of_patch(certificate: PatchCertificate) -> str:

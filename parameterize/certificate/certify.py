@@ -18,6 +18,8 @@ from ..spline.interface import Interface
 from .gluing import on_one_side
 from .jacobian import Parameters, PatchCertificate, Verdict, certify_patches
 
+SHOWN = 5  # defects of a body
+
 
 @dataclass(frozen=True)
 class Certificate(Shown):
@@ -72,6 +74,12 @@ class Certificate(Shown):
         return (*filter(None, named), *misglued)
 
     @property
+    def first_defects(self) -> tuple[str, ...]:
+        """Return the first defects, and how many more there are: a body may have thousands of patches."""
+        first, rest = self.defects[:SHOWN], len(self.defects) - SHOWN
+        return (*first, f"and {rest} more") if rest > 0 else first
+
+    @property
     def only(self) -> PatchCertificate:
         """Return the certificate of the patch of a body of one. Raises ValueError for several."""
         if len(self.patches) > 1:
@@ -116,7 +124,7 @@ class Certificate(Shown):
     def __str__(self) -> str:
         if self.verdict == "certified":
             return f"certified, |det J| >= {self.lower_bound:.3g} of its mean"
-        return f"{self.verdict}: {'; '.join(self.defects)}"
+        return f"{self.verdict}: {'; '.join(self.first_defects)}"
 
 
 def _defect(patch: PatchCertificate) -> str:

@@ -30,6 +30,7 @@ Measure = TypeVar("Measure", Distortion, Distances)
 # offered as the part. Maps that serve are within 0.5 % (docs/benchmarks); those of parts of which a wall or a leg is
 # missing were off by 3 to 70 %.
 FARTHEST, MOST_VOLUME = 0.02, 0.02
+MOST_LINES = 40  # of patches in a printed report
 
 
 @dataclass(frozen=True)
@@ -215,12 +216,15 @@ class QualityReport(Shown):
 
 
 def _lines_of(patches: Sequence[BoxDistortion]) -> list[str]:
-    """Return a table of patches, a line each; no line for no patches."""
+    """Return a table of patches, a line each, of many the most distorted ones; no line for no patches."""
+    worst = sorted(range(len(patches)), key=lambda number: patches[number].arap.max)[-MOST_LINES:]
     rows = [
         f"{f'p{number}':16}  {' x '.join(f'{side:.3g}' for side in found.box):<32}  "
         f"{found.arap.mean:.4g}, {found.arap.max:.4g}, {found.scaled_jacobian:.4g}"
-        for number, found in enumerate(patches)
+        for number, found in ((number, patches[number]) for number in sorted(worst))
     ]
+    if len(patches) > MOST_LINES:
+        rows.append(f"{'':16}  the {len(patches) - MOST_LINES} other patches are less distorted")
     return [f"{'':16}  {'own box':<32}  ARAP mean, max, scaled det J", *rows] if rows else []
 
 
