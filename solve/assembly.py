@@ -191,13 +191,13 @@ def _on_regions(
     return {face.name: face for face in faces}
 
 
-def balanced(load: Array, unknowns: Unknowns, space: TrialSpace) -> Array:
+def balanced(load: Array, unknowns: Unknowns) -> Array:
     """Return the free coefficients' load (1, ...) minus its mean, for problems that leave the solution's constant open.
 
-    The basis functions sum to one, so the returned load is orthogonal to constants. space: for sums over all processes.
+    The basis functions sum to one, so the returned load is orthogonal to constants.
     Raises ValueError where the load's sum, the integral of source and fluxes, is not nearly zero.
     """
-    total, size = float(space.total(load.sum())), float(space.total(np.abs(load).sum()))
+    total, size = (float(unknowns.processes.total(part.sum())) for part in (load, np.abs(load)))
     if abs(total) > LARGEST_IMBALANCE * size:
         raise ValueError(
             f"incompatible Neumann data: source plus flux integrate to {total:.4g}, must be 0 where no Dirichlet face, "

@@ -209,23 +209,28 @@ def _agree(given: Array, of_exact: Callable[[], tuple[Array, float]]) -> bool:
     return bool(np.abs(given - derived).max() <= AGREEMENT * size)
 
 
-def map_notices(patches: Sequence[PatchSystem], certified: str | None, weaknesses: Iterable[str]) -> list[str]:
+def map_notices(
+    patches: Sequence[PatchProblem], certified: str | None, weaknesses: Iterable[str], folded: Iterable[str] = ()
+) -> list[str]:
     """Return the notices on the map, and on a preconditioner that lacks a part.
 
-    weaknesses: the weakness of the preconditioner of each component.
+    weaknesses: the weakness of the preconditioner of each component. folded: the lines of `folded_notices`.
     """
     notices = []
     if certified not in (None, "certified"):
         notices.append(f"the map is {certified}, not certified: do not trust the solution")
-    for patch in patches:
-        matrix = patch.matrix
-        if matrix.folded:
-            points = matrix.space.total(int(np.prod(matrix.rule.shape)))
-            wrong = "det J < 0" if orientation(patch.volume) > 0 else "the map is left-handed, and det J > 0"
-            where = f" of patch {patch.problem.prefix[:-1]}" if patch.problem.prefix else ""
-            notices.append(f"{wrong} at {matrix.folded} of {points} Gauss points{where}: solved with |det J| instead")
-    notices += list(bending_notices(patches))
+    notices += [*folded, *bending_notices(patches)]
     return notices + [f"more iterations than usual: {text}" for text in dict.fromkeys(weaknesses) if text]
+
+
+def folded_notices(patch: PatchSystem) -> Iterator[str]:
+    """Yield a line on a patch at whose points det J has the wrong sign."""
+    matrix = patch.matrix
+    if matrix.folded:
+        points = matrix.space.total(int(np.prod(matrix.rule.shape)))
+        wrong = "det J < 0" if orientation(patch.volume) > 0 else "the map is left-handed, and det J > 0"
+        where = f" of patch {patch.problem.prefix[:-1]}" if patch.problem.prefix else ""
+        yield f"{wrong} at {matrix.folded} of {points} Gauss points{where}: solved with |det J| instead"
 
 
 def bending_notices(patches: Sequence[PatchProblem]) -> Iterator[str]:

@@ -233,7 +233,8 @@ class _Data:
 
     def system(self, shift: float) -> System:
         """Return the system of the law plus `shift` times the mass."""
-        return system_of(self.body, self.placed, self.patches, self.first.shifted(shift), is_loose=True)
+        first = self.first.shifted(shift)
+        return system_of(self.body, self.placed, self.patches, self.unknowns, first, is_loose=True)
 
 
 def _started(data: _Data, start: FieldOnBody | Data, time: float) -> OnPatches:

@@ -169,7 +169,7 @@ class _Balance:
         if len(body.parts) > 1 and not problem.form.has_reaction:
             operators = operators_of(matrix, loads.components)
             for part in body.parts:
-                demand_fixed(part, [own for number in part for own in operators[number]])
+                demand_fixed(part, [own for number in part for own in operators[number]], patches[0].space)
         unknowns = unknowns_of([patch.space for patch in patches], body.interfaces)
         free = matrix.layout.joined(unknowns.spread(np.ones((loads.components, *unknowns.shape))))
         known = matrix.layout.joined(unknowns.completed(known))

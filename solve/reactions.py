@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -83,27 +84,31 @@ def balance(
     products: Sequence[Array],
 ) -> Balance:
     """Return the balance of a solution's coefficients (c, n_u, n_v, n_w) of each patch, and of their products."""
-    space, components = patches[0].space, problem.form.components
+    processes, components = unknowns.processes, problem.form.components
     residuals = [product - patch.loads for patch, product in zip(patches, products, strict=True)]
     faces = [face for patch in patches for face in patch.weak]
-    reactions, own = _of_faces(patches, unknowns.on_fixed(residuals)), np.zeros(components)
+    rows = processes.shared(list(_of_faces(unknowns.patches, patches, unknowns.on_fixed(residuals))))
+    reactions: dict[str, Array] = {}
+    for _, role, force in sorted(chain.from_iterable(rows), key=lambda row: row[0]):
+        reactions[role] = reactions.get(role, 0.0) + force
+    own = np.zeros(components)
     supports = _supports(problem)
     for patch, full in zip(patches, coefficients, strict=True):
         outside = _add_regions(patch.problem, patch.weak, full, supports) + _add_robin_faces(patch, full, supports)
         lifted = sum(((f.weights * f.gamma * f.values).sum(axis=1) for f in patch.weak), np.zeros(components))
         own = own + patch.loads.sum(axis=(1, 2, 3)) - lifted - outside
-    load = space.total(own)
-    reactions |= {role: space.total(force) for role, force in supports.items()}
+    load = processes.total(own)
+    reactions |= {role: processes.total(force) for role, force in supports.items()}
     forces = [load, *reactions.values()]
     size = float(np.abs(forces).sum())
     parts = [part for patch, residual in zip(patches, residuals, strict=True) for part in (patch.loads, residual)]
-    scale = float(space.total(sum(np.abs(part).sum() for part in parts)))
+    scale = float(processes.total(sum(np.abs(part).sum() for part in parts)))
     size = scale if size < CANCELLED * scale else size
     imbalance = None
     if reactions and not problem.form.has_reaction:
         imbalance = float(np.abs(np.sum(forces, axis=0)).max()) / size if size > 0.0 else 0.0
     areas = {
-        condition.role: float(space.total(sum(face.weights[face.holds(i)].sum() for face in faces)))
+        condition.role: float(processes.total(sum(face.weights[face.holds(i)].sum() for face in faces)))
         for i, condition in enumerate(problem.conditions)
         if not condition.is_strong
     }
@@ -111,10 +116,14 @@ def balance(
     return Balance(tuple(load.tolist()), as_tuples, areas, imbalance)
 
 
-def _of_faces(patches: Sequence[PatchSystem], residuals: Sequence[Array]) -> dict[str, Array]:
-    """Return the reactions of the fixed coefficients, by the face of a patch or by the condition that names it."""
-    found: dict[str, Array] = {}
-    for patch, residual in zip(patches, residuals, strict=True):
+def _of_faces(
+    numbers: Sequence[int], patches: Sequence[PatchSystem], residuals: Sequence[Array]
+) -> Iterator[tuple[int, str, Array]]:
+    """Yield the reactions of the fixed coefficients on each face: the patch's number, the face or what names it, (c,).
+
+    numbers: those of the patches in the body.
+    """
+    for number, patch, residual in zip(numbers, patches, residuals, strict=True):
         space, fixed = patch.space, np.zeros(residual.shape[1:], dtype=bool)
         for axis, name in ((i // 2, name) for i, name in enumerate(FACE_NAMES) if name in space.dirichlet):
             here = np.zeros_like(fixed)
@@ -122,11 +131,9 @@ def _of_faces(patches: Sequence[PatchSystem], residuals: Sequence[Array]) -> dic
                 here[tuple((-1 if name[1] == "1" else 0) if a == axis else slice(None) for a in range(3))] = True
             here &= ~fixed
             fixed |= here
-            force = space.total((residual * here)[:, space.own].sum(axis=(1, 2, 3)))
+            force = (residual * here)[:, space.own].sum(axis=(1, 2, 3))
             support = patch.problem.strong_on(name)
-            role = patch.problem.prefix + name if support is None or support.name else support.role
-            found[role] = found.get(role, 0.0) + force
-    return found
+            yield number, patch.problem.prefix + name if support is None or support.name else support.role, force
 
 
 def _has_end(space: TrialSpace, name: str) -> bool:

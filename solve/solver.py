@@ -13,7 +13,7 @@ from parameterize.spline.body import Body, BodyLike, as_body
 from parameterize.spline.bspline import greville, open_uniform_knots
 from parameterize.spline.volume import BSplineVolume
 
-from .assembly import assemble_data, balanced
+from .assembly import assemble_body_data, balanced
 from .discretization.on_regions import demand_area, demand_supports
 from .discretization.quadrature import gauss_rule, map_planes
 from .discretization.slab import shared_space
@@ -201,24 +201,25 @@ def check_problem(body: BodyLike, problem: BoundaryValueProblem, comm: Any = Non
     """
     problem.demand_held()
     options = SolveOptions(threads=1, quadrature="gauss", comm=comm)
-    _, patches = _on_patches(as_body(body), problem, options)
+    glued = as_body(body)
+    _, patches = _on_patches(glued, problem, options)
     patches = [replace(patch, space=shared_space(patch.space, comm)) for patch in patches]
-    loads, faces = [], []
-    for patch in patches:
-        matrix, load, _ = assemble_data(patch.volume, patch.problem, patch.space, options)
-        loads.append(load)
-        faces += [face for face in matrix.faces.values() if isinstance(face, WeakFace)]
-    demand_area(problem, faces, patches[0].space, [patch.volume for patch in patches])
+    unknowns = unknowns_of([patch.space for patch in patches], glued.interfaces)
+    own = [patches[number] for number in unknowns.patches]
+    with unknowns.agreed():
+        matrix, loads, _ = assemble_body_data(own, options)
+    faces = [face for part in matrix.parts for face in part.faces.values() if isinstance(face, WeakFace)]
+    demand_area(problem, faces, unknowns.processes, glued.patches)
     if problem.fixes_nothing and problem.conditions:
-        demand_supports(problem, faces, patches[0].space, [patch.volume for patch in patches])
+        demand_supports(problem, faces, unknowns.processes, glued.patches)
     if problem.fixes_nothing and not problem.form.has_reaction:
-        unknowns = unknowns_of([patch.space for patch in patches], as_body(body).interfaces)
-        balanced(unknowns.collect(loads), unknowns, patches[0].space)
+        balanced(unknowns.collect(loads), unknowns)
     if problem.exact is not None:
-        for patch in patches:
-            with patch.space.agreed():
-                for _, _, x in map_planes(patch.volume, gauss_rule(patch.space)):
-                    patch.problem.exact_at(x)
+        with unknowns.agreed():
+            for patch in own:
+                with patch.space.agreed():
+                    for _, _, x in map_planes(patch.volume, gauss_rule(patch.space)):
+                        patch.problem.exact_at(x)
 
 
 @functools.cache

@@ -18,14 +18,15 @@ from parameterize.spline.interface import Interface
 from parameterize.threads import one_blas_thread
 
 from .assembly import Assembled, assemble_body_data, balanced
-from .diagnostics import ConvergenceError, failure, judge, map_notices
+from .diagnostics import ConvergenceError, failure, folded_notices, judge, map_notices
 from .discretization.error_norms import Compared, Errors, error_norms, missing_mean
 from .discretization.estimate import error_estimate
 from .discretization.grouped import BodyMatrix, Law, assemble_body
 from .discretization.on_regions import demand_area, demand_supports
 from .discretization.operator import FormOperator, Operator
+from .discretization.processes import Processes
 from .discretization.quadrature import GaussRule, operator_rule
-from .discretization.space import TrialSpace, embedded, longest_edges
+from .discretization.space import embedded, longest_edges
 from .discretization.unknowns import Glued, Unknowns, unknowns_of
 from .field import BodyField, FieldOnBody, SplineField
 from .forms.boundary_value_problem import BoundaryValueProblem
@@ -86,17 +87,13 @@ class System:
 
     body: Body
     problem: BoundaryValueProblem
-    patches: tuple[PatchSystem, ...]
+    stated: Sequence[PatchProblem]  # on every patch of the body
+    patches: tuple[PatchSystem, ...]  # of this process
     matrix: BodyMatrix  # of all patches
     unknowns: Unknowns
     blocks: tuple[Preconditioner, ...]  # a component each
     right: Array  # b, (c, ...): of the free coefficients
     setup: float = 0.0  # process seconds
-
-    @property
-    def space(self) -> TrialSpace:
-        """Return the space of the first patch, by which processes send messages."""
-        return self.patches[0].space
 
     @property
     def operator(self) -> LinearOperator:
@@ -154,7 +151,11 @@ class System:
         """
         if np.size(x) != self.right.size:
             raise ValueError(f"x must have {self.right.size} entries, the free coefficients, got {np.size(x)}")
-        return field_of(self.body, self.patches, self._filled(np.reshape(x, self.right.shape)))
+        return self._field(self._filled(np.reshape(x, self.right.shape)))
+
+    def _field(self, full: Sequence[Array]) -> BodyField:
+        """Return the field of the coefficients (c, n_u, n_v, n_w) of each patch of this process."""
+        return field_of(self.body, self.stated, self.unknowns.whole(full))
 
     def _filled(self, free: Array) -> list[Array]:
         """Return all coefficients (c, n_u, n_v, n_w) of each patch, with the fixed coefficients."""
@@ -169,7 +170,7 @@ class System:
 
         Raises ValueError for any other field.
         """
-        return self.unknowns.chosen(coefficients_in(field, self.patches)).ravel()
+        return self.unknowns.chosen(coefficients_in(field, self.stated, self.unknowns.patches)).ravel()
 
     def precondition(self, residual: Array) -> Array:
         """Return the preconditioner times the free coefficients (c, ...)."""
@@ -200,43 +201,45 @@ class System:
             raise ValueError(f"several patches are solved on device='cpu' only, got device={options.device!r}")
         with one_blas_thread():
             solution = self._solve(options)
-        for notice in solution.report.notices if self.space.rank == 0 else ():
+        for notice in solution.report.notices if self.unknowns.processes.rank == 0 else ():
             log.warning("%s", notice)
         if options.strict and not solution.report.converged:
             raise ConvergenceError(solution.report.notices[-1], solution)
         return solution
 
     def _solve(self, options: IterationOptions) -> Solution:
-        problem, space = self.problem, self.space
+        problem, processes = self.problem, self.unknowns.processes
         dofs = len(self.right) * self.unknowns.count
-        clock, sent = [time.process_time()], space.traffic()
+        clock, sent = [time.process_time()], processes.traffic()
         result = self._iterate(options)
-        failed = failure(self.patches, result, problem.form.caveat)
+        failed = failure(self.stated, result, problem.form.caveat)
         if failed and result.iterations == 0:  # there is the start alone
             raise ConvergenceError(failed)
         steps = result.iterations + (options.start is not None)  # products made
-        traffic = {kind: (count - sent.get(kind, 0)) / steps for kind, count in space.traffic().items() if steps}
+        traffic = {kind: (count - sent.get(kind, 0)) / steps for kind, count in processes.traffic().items() if steps}
         full = self._filled(result.x)
         if self.blocks[0].singular:
-            mean = missing_mean(self._parts(full))
+            mean = missing_mean(self._parts(full), processes)
             full = [part + mean for part in full]
         clock.append(time.process_time())
-        largest = max(float(size) for part in full for size in space.shared(np.abs(part).max(initial=0.0)))
+        largest = max(processes.shared(max(float(np.abs(part).max(initial=0.0)) for part in full)))
         has_norm = largest <= LARGEST_VALUE
         errors, estimate = self._errors(full, result.x, options.estimate) if has_norm else (None, None)
         clock.append(time.process_time())
-        doubtful, meaningful = judge(problem, self.patches, errors, estimate if result.converged else None, dofs)
+        doubtful, meaningful = judge(problem, self.stated, errors, estimate if result.converged else None, dofs)
         if errors is None and problem.form.caveat:
             doubtful.append(f"the error is not estimated: {problem.form.caveat}; compare two refinements")
-        elif errors is None and len(self.patches) > 1:
+        elif errors is None and len(self.stated) > 1:
             doubtful.append(CONTINUOUS)
         if not has_norm:
             doubtful.append(f"the solution reaches {largest:.1e}, too large for its norms: choose other units")
-        of_map = map_notices(self.patches, options.certified, [block.weakness for block in self.blocks])
+        weaknesses = [text for own in processes.shared([block.weakness for block in self.blocks]) for text in own]
+        of_map = map_notices(self.stated, options.certified, weaknesses, self._folded)
+        spaces = [patch.space for patch in self.patches]
         report = SolveReport(
-            elements=sum(patch.space.elements for patch in self.patches),
+            elements=sum(patch.space.elements for patch in self.stated),
             dofs=dofs,
-            h=longest_edges([patch.volume for patch in self.patches], [patch.space for patch in self.patches]),
+            h=max(processes.shared(longest_edges([own.volume for own in self.patches], spaces))),
             iterations=result.iterations,
             converged=result.converged,
             residual=result.residuals[-1],
@@ -249,8 +252,14 @@ class System:
             traffic=traffic,
             balance=balance(problem, self.patches, self.unknowns, full, self.matrix.apply(full)) if has_norm else None,
         )
-        problems = [patch.problem for patch in self.patches]
-        return Solution.of(field_of(self.body, self.patches, full), problems, report, problem)
+        problems = [patch.problem for patch in self.stated]
+        return Solution.of(self._field(full), problems, report, problem)
+
+    @property
+    def _folded(self) -> Sequence[str]:
+        """Return a line on each patch, of all processes, at whose points det J has the wrong sign."""
+        own = [line for patch in self.patches for line in folded_notices(patch)]
+        return list(dict.fromkeys(line for lines in self.unknowns.processes.shared(own) for line in lines))
 
     def _parts(self, full: Sequence[Array]) -> list[Compared]:
         """Return coefficients (c, n_u, n_v, n_w) of each patch with the exact values, zero where none are known."""
@@ -276,8 +285,8 @@ class System:
         """
         errors = estimate = None
         if self.problem.exact is not None:
-            errors = error_norms(self._parts(full), self.patches[0].matrix.threads)
-        if len(self.patches) == 1 and (is_estimated or (is_estimated is None and self.problem.exact is None)):
+            errors = error_norms(self._parts(full), self.patches[0].matrix.threads, self.unknowns.processes)
+        if len(self.stated) == 1 and (is_estimated or (is_estimated is None and self.problem.exact is None)):
             (patch,) = self.patches
             estimate = error_estimate(patch.volume, patch.space, full[0], patch.problem, self._energy(free))
         return errors, estimate
@@ -288,9 +297,10 @@ class System:
             np.count_nonzero(patch.known) + sum(int(np.count_nonzero(face.values)) for face in patch.weak)
             for patch in self.patches
         )
-        if not self.problem.form.symmetric or self.space.total(given):
+        total = self.unknowns.processes.total
+        if not self.problem.form.symmetric or total(given):
             return None
-        return float(self.space.total((self.right * free).sum()))
+        return float(total((self.right * free).sum()))
 
     def _iterate(self, options: IterationOptions) -> LinearResult:
         """Return the result of conjugate gradients, or of GMRES where the law is not symmetric."""
@@ -303,33 +313,35 @@ class System:
             assert isinstance(operator, Operator) and isinstance(block, FastDiagonalization)
             return solve_on_device(operator, block, self.right, *limits, options.device, guess)
         if self.problem.form.symmetric:
-            system = _Told(self.product, self.space.rank == 0), self.right, self.precondition
-            return conjugate_gradients(*system, *limits, guess, self.space.total)
-        if isinstance(self.unknowns, Glued):
-            return generalized_residuals(self.product, self.right, self.precondition, *limits)
+            processes = self.unknowns.processes
+            system = _Told(self.product, processes.rank == 0), self.right, self.precondition
+            return conjugate_gradients(*system, *limits, guess, processes.total)
         # the vectors of GMRES are whole on every process, products and preconditioner are shared
-        gather, own = self.space.gather, (slice(None), self.space.place)
+        joined, own = self.unknowns.joined, (slice(None), self.unknowns.place)
         found = generalized_residuals(
-            lambda x: gather(self.product(x[own])),
-            gather(self.right),
-            lambda x: gather(self.precondition(x[own])),
+            lambda x: joined(self.product(x[own])),
+            joined(self.right),
+            lambda x: joined(self.precondition(x[own])),
             *limits,
-            None if guess is None else gather(guess),
+            None if guess is None else joined(guess),
         )
         return replace(found, x=found.x[own])
 
 
-def coefficients_in(field: FieldOnBody, patches: Sequence[PatchProblem]) -> list[Array]:
+def coefficients_in(
+    field: FieldOnBody, patches: Sequence[PatchProblem], wanted: Sequence[int] | None = None
+) -> list[Array]:
     """Return the coefficients (c, n_u, n_v, n_w) of a field in the space of each patch, which contains the field's.
 
-    Raises ValueError for any other field, TypeError for what is no field.
+    wanted: the numbers of the patches whose coefficients are returned; by default all. Raises ValueError for any other
+    field, TypeError for what is no field.
     """
     if not isinstance(field, FieldOnBody):
         raise TypeError(f"start must be a field of the trial space, such as solution.field, got {field!r:.80}")
     if len(field.patches) != len(patches):
         raise ValueError(f"the field has {len(field.patches)} patches, the body {len(patches)}")
     found = []
-    for own, patch in zip(field.patches, patches, strict=True):
+    for own, patch in ((field.patches[i], patches[i]) for i in wanted or range(len(patches))):
         full = embedded(own.coefficients, own.degrees, own.knots, patch.space)
         found.append(full[None] if full.ndim == 3 else np.moveaxis(full, -1, 0))
         if len(found[-1]) != (components := patch.problem.form.components):
@@ -338,10 +350,9 @@ def coefficients_in(field: FieldOnBody, patches: Sequence[PatchProblem]) -> list
 
 
 def field_of(body: Body, patches: Sequence[PatchProblem], full: Sequence[Array]) -> BodyField:
-    """Return the field of coefficients (c, n_u, n_v, n_w) of each patch, gathered from all processes."""
+    """Return the field of coefficients (c, n_u, n_v, n_w) of each patch of a body."""
     found = []
-    for patch, own in zip(patches, full, strict=True):
-        whole = patch.space.gather(own[:, patch.space.own])
+    for patch, whole in zip(patches, full, strict=True):
         coefficients = whole[0] if len(whole) == 1 else np.moveaxis(whole, 0, -1)
         found.append(SplineField(patch.space.degrees, patch.space.whole.knots, coefficients, patch.volume))
     return BodyField(tuple(found), body)
@@ -365,19 +376,26 @@ def build(
     """
     start = time.process_time()
     with one_blas_thread():
-        system = system_of(body, problem, patches, assemble_body_data(patches, options), is_loose)
+        unknowns = unknowns_of([patch.space for patch in patches], body.interfaces)
+        with unknowns.agreed():
+            found = assemble_body_data([patches[number] for number in unknowns.patches], options)
+        system = system_of(body, problem, patches, unknowns, found, is_loose)
     return replace(system, setup=time.process_time() - start)
 
 
 def system_of(
-    body: Body, problem: BoundaryValueProblem, patches: Sequence[PatchProblem], found: Assembled, is_loose: bool
+    body: Body,
+    problem: BoundaryValueProblem,
+    patches: Sequence[PatchProblem],
+    unknowns: Unknowns,
+    found: Assembled,
+    is_loose: bool,
 ) -> System:
-    """Return the system of `build` from what is assembled."""
+    """Return the system of `build` from the unknowns and what is assembled on the patches of this process."""
     matrix, loads = found.matrix, found.loads
-    unknowns = unknowns_of([patch.space for patch in patches], body.interfaces)
     known = matrix.layout.joined(unknowns.completed(found.known))
-    systems = systems_of(patches, found._replace(known=known))
-    _demand_held(body, problem, systems, is_loose)
+    systems = systems_of([patches[number] for number in unknowns.patches], found._replace(known=known))
+    _demand_held(body, problem, systems, unknowns, is_loose)
     blocks = preconditioners(unknowns, [system.operators for system in systems], body.interfaces)
     if blocks[0].singular and not is_loose and isinstance(systems[0].matrix, FormOperator):
         raise ValueError(
@@ -385,33 +403,35 @@ def system_of(
             "determine the solution: give a value, or an exchange, on a face or a region"
         )
     right = unknowns.collect(loads - matrix.apply(known))
-    right = balanced(right, unknowns, systems[0].space) if blocks[0].singular and not is_loose else right
-    return System(body, problem, systems, matrix, unknowns, blocks, right)
+    right = balanced(right, unknowns) if blocks[0].singular and not is_loose else right
+    return System(body, problem, patches, systems, matrix, unknowns, blocks, right)
 
 
-def _demand_held(body: Body, problem: BoundaryValueProblem, systems: Sequence[PatchSystem], is_loose: bool) -> None:
+def _demand_held(
+    body: Body, problem: BoundaryValueProblem, systems: Sequence[PatchSystem], unknowns: Unknowns, is_loose: bool
+) -> None:
     """Raise ValueError where a region has no area, and where a part of a body that is not loose is free to move."""
-    space, volumes = systems[0].space, [system.volume for system in systems]
-    demand_area(problem, [face for system in systems for face in system.weak], space, volumes)
+    processes, here = unknowns.processes, dict(zip(unknowns.patches, systems, strict=True))
+    demand_area(problem, [face for system in systems for face in system.weak], processes, body.patches)
     if is_loose:
         return
     parts = body.parts
     for numbers in parts:
-        part = [systems[number] for number in numbers]
+        part = [here[number] for number in numbers if number in here]
         faces = [face for system in part for face in system.weak]
         named = ", ".join(f"p{number}" for number in numbers)
         try:
-            if problem.conditions and not any(system.space.dirichlet for system in part):
-                demand_supports(problem, faces, space, [system.volume for system in part])
+            if problem.conditions and not processes.total(sum(len(system.space.dirichlet) for system in part)):
+                demand_supports(problem, faces, processes, [body.patches[number] for number in numbers])
         except ValueError as error:
             raise ValueError(f"{named}: {error}" if len(parts) > 1 else str(error)) from None
         if len(parts) > 1:
-            demand_fixed(numbers, [operator for system in part for operator in system.operators])
+            demand_fixed(numbers, [operator for system in part for operator in system.operators], processes)
 
 
-def demand_fixed(part: Sequence[int], operators: Sequence[Operator]) -> None:
+def demand_fixed(part: Sequence[int], operators: Sequence[Operator], processes: Processes) -> None:
     """Raise ValueError where the operators of a part of a body, patches by their numbers, leave a constant free."""
-    if all(leaves_constants(operator) for operator in operators):
+    if all(processes.shared(all(map(leaves_constants, operators)))):
         named = ", ".join(f"p{number}" for number in part)
         raise ValueError(f"nothing fixes the solution on {named}, a part of its own: give it a value, or glue it")
 

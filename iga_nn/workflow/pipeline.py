@@ -21,7 +21,7 @@ from parameterize.spline.body import BodyLike, as_body
 from parameterize.spline.volume import BSplineVolume
 from parameterize.threads import default_threads
 from solve import ConvergenceRow, Solution, check_device, check_problem, convergence, modes
-from solve.discretization.slab import agreed
+from solve.discretization.processes import agreed
 from solve.forms.boundary_value_problem import BoundaryValueProblem
 from solve.study import with_rates
 

@@ -13,6 +13,7 @@ from parameterize.threads import in_parallel
 from ..field import Points
 from . import group_kernels, kernels
 from .error_kernels import error_squares
+from .processes import Processes
 from .quadrature import GaussRule, gauss_rule, map_rows
 from .space import TrialSpace
 from .stack import Piece, Stack, Stacked, stacks_of
@@ -52,20 +53,22 @@ class Errors:
     h1_relative: float | None = None
 
 
-def error_norms(parts: Sequence[Compared], threads: int = 1) -> Errors:
+def error_norms(parts: Sequence[Compared], threads: int = 1, processes: Processes | None = None) -> Errors:
     """Return error norms over the physical domain, over all patches and components together.
 
-    The integrals use degree + 2 Gauss points a span and direction.
+    The integrals use degree + 2 Gauss points a span and direction. processes: those that share the body; by default
+    those of the first patch.
     """
-    sums, has_gradient = np.zeros(4), True
+    sums, has_gradient, processes = np.zeros(4), True, processes or parts[0].space
     rules: dict[Any, GaussRule] = {}
     stacked = [_stacked(part, rules, [degree + 2 for degree in part.space.degrees]) for part in parts]
     for numbers, stack in stacks_of(stacked, threads):
         own = [parts[number] for number in numbers]
         squares, known = _squares(*own[0][:4], threads) if len(own) == 1 else _squares_of_stack(stack, own)
-        sums += stack.space.total(squares)
-        has_gradient &= all(stack.space.shared(known))
-    l2, norm, seminorm, slope = np.sqrt(sums).tolist()
+        sums += squares
+        has_gradient &= known
+    l2, norm, seminorm, slope = np.sqrt(processes.total(sums)).tolist()
+    has_gradient = all(processes.shared(has_gradient))
     if not has_gradient:
         return Errors(l2, ratio(l2, norm))
     return Errors(l2, ratio(l2, norm), seminorm, ratio(seminorm, slope))
@@ -176,8 +179,11 @@ def ratio(error: float, size: float) -> float | None:
     return error / size if size > 0.0 else None
 
 
-def missing_mean(parts: Sequence[Compared]) -> float:
-    """Return the constant to add to a solution of one component for the mean of the exact values."""
+def missing_mean(parts: Sequence[Compared], processes: Processes) -> float:
+    """Return the constant to add to a solution of one component for the mean of the exact values.
+
+    processes: those that share the body.
+    """
     lack = size = 0.0
     rules: dict[Any, GaussRule] = {}
     for numbers, stack in stacks_of([_stacked(part, rules) for part in parts], 1):
@@ -198,5 +204,5 @@ def missing_mean(parts: Sequence[Compared]) -> float:
 
         with stack.space.agreed():
             stack.on_pieces(integrate)
-        lack, size = lack + stack.space.total(float(here.sum())), size + stack.space.total(float(of_one.sum()))
-    return float(lack / size)
+        lack, size = lack + float(here.sum()), size + float(of_one.sum())
+    return float(processes.total(lack) / processes.total(size))

@@ -19,6 +19,7 @@ from ..field import Points
 from ..forms.boundary_value_problem import BoundaryValueProblem
 from ..forms.conditions import Condition, Value
 from .face_data import has_face
+from .processes import Processes
 from .space import TrialSpace
 from .surface_rule import SurfaceRule, surface_rule
 from .weak import WeakFace
@@ -69,13 +70,16 @@ def _may_overlap(problem: BoundaryValueProblem, name: str, strong: Value) -> boo
     return any(not one.faces or not names.isdisjoint(one.faces) for one in others)
 
 
-def demand_area(problem: BoundaryValueProblem, faces: Sequence[WeakFace], space: TrialSpace, volumes: Patches) -> None:
+def demand_area(
+    problem: BoundaryValueProblem, faces: Sequence[WeakFace], processes: Processes, volumes: Patches
+) -> None:
     """Raise ValueError where a region has no area on the boundary, without the faces that the trial spaces hold.
 
-    faces: those of all patches with terms of conditions. space: any of the patches', for sums over all processes.
+    faces: those of all patches of this process with terms of conditions. volumes: all of the body.
     """
     for i, condition in enumerate(problem.conditions):
-        if not condition.is_strong and space.total(sum(face.weights[face.holds(i)].sum() for face in faces)) == 0.0:
+        area = sum(face.weights[face.holds(i)].sum() for face in faces)
+        if not condition.is_strong and processes.total(area) == 0.0:
             points = all_control_points(volumes)
             low, high = (in_brackets(ends.tolist()) for ends in (points.min(axis=0), points.max(axis=0)))
             strong = [one.role for one in problem.conditions if one.is_strong]
@@ -86,20 +90,20 @@ def demand_area(problem: BoundaryValueProblem, faces: Sequence[WeakFace], space:
 
 
 def demand_supports(
-    problem: BoundaryValueProblem, faces: Sequence[WeakFace], space: TrialSpace, volumes: Patches
+    problem: BoundaryValueProblem, faces: Sequence[WeakFace], processes: Processes, volumes: Patches
 ) -> None:
     """Raise ValueError where the supports leave a motion free that the law does not resist (`Form.free_motions`).
 
     Arguments as in `demand_area`; for a body that no Dirichlet data hold.
     """
     holding = [face.weights * (np.einsum("ccm->m", face.projector) + (face.factor > 0.0)) for face in faces]
-    area = space.total(sum(float(weights.sum()) for weights in holding))
+    area = processes.total(sum(float(weights.sum()) for weights in holding))
     if not problem.form.free_motions(np.zeros((3, 1))).size:
         return
     if area == 0.0:
         raise ValueError("no support holds the body: give fix, roller, symmetry or spring")
     size = size_of(volumes)
-    middle = space.total(sum(face.x @ weights for face, weights in zip(faces, holding, strict=True))) / area
+    middle = processes.total(sum(face.x @ weights for face, weights in zip(faces, holding, strict=True))) / area
     moved = held = 0.0
     for face, weights in zip(faces, holding, strict=True):
         motions = problem.form.free_motions((np.asarray(face.x) - middle[:, None]) / size)
@@ -107,7 +111,7 @@ def demand_supports(
         kept = np.where(sprung, motions, np.einsum("cdm,kdm->kcm", face.projector, motions))
         moved = moved + np.einsum("kcm,lcm,m->kl", motions, motions, face.weights * (weights > 0.0))
         held = held + np.einsum("kcm,lcm,m->kl", kept, kept, face.weights)
-    free = _unheld(space.total(moved) / area, space.total(held) / area)
+    free = _unheld(processes.total(moved) / area, processes.total(held) / area)
     if free is not None:
         said = ", ".join(f"{part:.2g}" for part in (free / np.abs(free).max()).round(3) + 0.0)
         raise ValueError(

@@ -8,8 +8,7 @@ others have copies, up to `degree` rows after their own rows.
 import logging
 import math
 from collections import Counter
-from collections.abc import Iterator, Sequence
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
@@ -20,48 +19,10 @@ import numpy as np
 from parameterize.arrays import Array, IntArray
 from parameterize.spline.bspline import breakpoints, find_spans
 
+from .processes import Messenger, agreed
 from .space import TrialSpace, Window
 
 log = logging.getLogger(__name__)
-
-Message = tuple[int, Array]  # another process, and the array that is sent to it or received from it
-
-
-@contextmanager
-def agreed(comm: Any) -> Iterator[None]:
-    """Raise an error of the block on one process on all processes; the block must not wait for other processes."""
-    fault = None
-    try:
-        yield
-    except Exception as error:  # whatever a user's data or memory do
-        fault = error
-    for found in comm.allgather(fault):
-        if found is not None:
-            raise found
-
-
-class Messenger:
-    """Pass arrays between the processes of a communicator of mpi4py.
-
-    sent: the number of bytes that this process has sent so far, by purpose.
-    """
-
-    def __init__(self, comm: Any) -> None:
-        self.comm = comm
-        self.sent: Counter[str] = Counter()
-
-    def exchange(self, sent: Sequence[Message], received: Sequence[Message]) -> None:
-        """Send arrays to other processes, and fill arrays with the messages of other processes."""
-        requests = [self.comm.Irecv(part, rank) for rank, part in received]
-        requests += [self.comm.Isend(part, rank) for rank, part in sent]
-        self.sent["halo"] += sum(part.nbytes for _, part in sent)
-        for request in requests:
-            request.Wait()
-
-    def transpose(self, sent: Array, sizes: Any, received: Array, counts: Any, kept: int) -> None:
-        """Send a part of an array to each process; kept: the number of entries that stay on this process."""
-        self.comm.Alltoallv((sent, sizes), (received, counts))
-        self.sent["transposition"] += 8 * (sent.size - kept)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -98,7 +59,7 @@ class Slab(TrialSpace):
     @property
     def rank(self) -> int:
         """Return the number of this process, 0 for the first."""
-        return int(self.comm.rank)
+        return self.messenger.rank
 
     @cached_property
     def spans(self) -> IntArray:
@@ -172,12 +133,11 @@ class Slab(TrialSpace):
 
     def shared(self, value: Any) -> list[Any]:
         """Return the value of every process, in the order of their ranks."""
-        found: list[Any] = self.comm.allgather(value)
-        return found
+        return self.messenger.shared(value)
 
     def traffic(self) -> Counter[str]:
         """Return the number of bytes that all processes have sent so far, by purpose."""
-        return sum(self.shared(self.messenger.sent), Counter())
+        return self.messenger.traffic()
 
     def fill(self, coefficients: Array) -> None:
         """Overwrite the copies of rows (.., n_u, n_v, n_w) by the values of their owners."""
@@ -205,12 +165,8 @@ class Slab(TrialSpace):
 
     def gather(self, own: Array) -> Array:
         """Return the rows (c, m_u, ..) of all processes, one after another."""
-        counts = self.shared(own.shape[1])
-        whole = np.empty((len(own), sum(counts), *own.shape[2:]))
-        self.messenger.sent["gather"] += own.nbytes * (self.comm.size - 1)
-        for part, result in zip(own, whole, strict=True):
-            self.comm.Allgatherv(np.ascontiguousarray(part), (result, [n * result[0].size for n in counts]))
-        return whole
+        sizes = self.shared(own[0].size)
+        return np.stack([self.messenger.gather(part, sizes).reshape(-1, *own.shape[2:]) for part in own])
 
     def to_columns(self, x: Any) -> Any:
         """Return all free rows of this process's columns, (m_u, columns, m_w), from own free rows (rows, m_v, m_w)."""

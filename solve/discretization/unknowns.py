@@ -5,6 +5,7 @@ vector: with Q the matrix of the first, the matrix of a body is A = Q^T (matrice
 """
 
 from collections.abc import Sequence
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Protocol
@@ -16,11 +17,24 @@ from parameterize.spline.body import shared_numbers
 from parameterize.spline.interface import Interface
 
 from .groups import Layout, OnPatches
+from .processes import Processes
 from .space import TrialSpace
 
 
 class Unknowns(Protocol):
-    """Describe the unknowns of a body; a vector has one row of them for each component."""
+    """Describe the unknowns of a body; a vector has one row of them for each component.
+
+    Where processes share the body, each has some of its patches, or some rows of its only patch, and a vector has the
+    unknowns that its process owns. All processes call each method.
+    """
+
+    @property
+    def processes(self) -> Processes:
+        """Return the processes that share the body."""
+
+    @property
+    def patches(self) -> Sequence[int]:
+        """Return the numbers of the patches of this process."""
 
     @property
     def count(self) -> int:
@@ -51,12 +65,31 @@ class Unknowns(Protocol):
         The sum stands in the first patch whose data fix the coefficient, the other patches have zero.
         """
 
+    @property
+    def place(self) -> slice:
+        """Return where the vector of this process is in `joined`, along its second dimension."""
+
+    def joined(self, x: Array) -> Array:
+        """Return the vectors (c, ...) of all processes, one after another."""
+
+    def whole(self, coefficients: Sequence[Array]) -> list[Array]:
+        """Return the coefficients (c, n_u, n_v, n_w) of every patch of the body from those of this process."""
+
+    def agreed(self) -> AbstractContextManager[None]:
+        """Return a context that raises an error of one process on all; one patch agrees where data are evaluated."""
+
 
 @dataclass(frozen=True, eq=False)
 class Window:
     """Number the unknowns of one patch, or of the slab of a process: a box of its coefficients."""
 
     space: TrialSpace
+    patches: Sequence[int] = (0,)
+
+    @property
+    def processes(self) -> Processes:
+        """Return the processes that share the patch."""
+        return self.space
 
     @property
     def count(self) -> int:
@@ -100,6 +133,24 @@ class Window:
         """Return the integrals, with the parts of other processes."""
         return [self.assembled(integrals)]
 
+    @property
+    def place(self) -> slice:
+        """Return the own rows of this process among all free rows."""
+        return self.space.place
+
+    def joined(self, x: Array) -> Array:
+        """Return the free rows (c, m_u, ..) of all processes."""
+        return self.space.gather(x)
+
+    def whole(self, coefficients: Sequence[Array]) -> list[Array]:
+        """Return the rows (c, n_u, n_v, n_w) of all processes."""
+        (own,) = coefficients
+        return [self.space.gather(own[:, self.space.own])]
+
+    def agreed(self) -> AbstractContextManager[None]:
+        """Return a context without effect."""
+        return nullcontext()
+
 
 @dataclass(frozen=True, eq=False)
 class Glued:
@@ -125,6 +176,16 @@ class Glued:
             inner[space.free] = True
             fixed[own[~inner]] = True
         return cls(tuple(spaces), numbers, count, fixed)
+
+    @property
+    def processes(self) -> Processes:
+        """Return the only process."""
+        return self.spaces[0]
+
+    @property
+    def patches(self) -> Sequence[int]:
+        """Return the numbers of all patches."""
+        return range(len(self.spaces))
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -208,6 +269,23 @@ class Glued:
         """Return integrals of fixed coefficients, summed over all patches, in the first patch whose data fix them."""
         total = self.assembled(integrals)
         return [total[:, own] * is_owned for own, is_owned in zip(self.numbers, self.owned, strict=True)]
+
+    @property
+    def place(self) -> slice:
+        """Return all of a vector."""
+        return slice(None)
+
+    def joined(self, x: Array) -> Array:
+        """Return the vector."""
+        return x
+
+    def whole(self, coefficients: Sequence[Array]) -> list[Array]:
+        """Return the coefficients."""
+        return list(coefficients)
+
+    def agreed(self) -> AbstractContextManager[None]:
+        """Return a context without effect."""
+        return nullcontext()
 
 
 def unknowns_of(spaces: Sequence[TrialSpace], interfaces: Sequence[Interface]) -> Window | Glued:
