@@ -73,6 +73,15 @@ def test_damaged_groups_are_refused(change, in_groups, tmp_path):
         iga_nn.load_volume(tmp_path / "bad.npz")
 
 
+def test_groups_with_more_control_points_than_patches_are_refused(in_groups, tmp_path):
+    exact_ring().save(tmp_path / "body.npz")
+    held = load_arrays(tmp_path / "body.npz", tuple(array_names(tmp_path / "body.npz")))
+    twice = np.concatenate([held["g0_control_points"]] * 2)
+    save_arrays(tmp_path / "bad.npz", **held | {"g0_control_points": twice})
+    with pytest.raises(iga_nn.InputError, match=r"bad\.npz: each patch must be in one group"):
+        iga_nn.load_volume(tmp_path / "bad.npz")
+
+
 @pytest.mark.parametrize(
     ("name", "change", "says"),
     [

@@ -101,8 +101,9 @@ def _ungrouped(path: str | Path, groups: Sequence[PatchArrays]) -> list[PatchArr
 
 
 def _rows(group: PatchArrays) -> Iterator[PatchArrays]:
-    """Yield the arrays of each patch of a group."""
+    """Yield the arrays of each patch of a group; none if their numbers of rows differ."""
     basis = {name: group[name] for name in BASIS}
-    others = [name for name in group if name not in (*BASIS, "patches")]
-    for own in zip(*(np.atleast_1d(group[name]) for name in others), strict=False):
-        yield basis | dict(zip(others, own, strict=True))
+    others = {name: np.atleast_1d(array) for name, array in group.items() if name not in BASIS}
+    if len({len(array) for array in others.values()}) == 1:
+        for own in zip(*others.values(), strict=True):
+            yield basis | dict(zip(others, own, strict=True))
