@@ -1,11 +1,12 @@
 """Discretizes data on the images of the cube's faces: Dirichlet values projected, Neumann and Robin data integrated."""
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
-from scipy.sparse import csr_array
+from scipy.sparse import coo_array, csr_array, diags_array, eye_array, kron
 
 from parameterize.arrays import Array
 from parameterize.spline.bspline import apply_along, collocation
@@ -98,6 +99,11 @@ class FaceRule:
             values = self.bases[0] @ component[self.layer] @ self.bases[1].T
             total[self.layer] += self.integrate(values)
 
+    def matrix(self, shape: tuple[int, ...]) -> coo_array:
+        """Return the matrix of Robin's term for coefficients of a shape (c, n_u, n_v, n_w) as a vector."""
+        values = on_layer(kron(*self.bases, format="csr"), self.layer, shape)
+        return kron(eye_array(shape[0]), values.T @ diags_array(self.measure.ravel()) @ values, format="coo")
+
     def add_diagonal(self, component: int, diagonal: Array) -> None:
         """Add the diagonal of Robin's term, the same for each component, to an array (n_u, n_v, n_w)."""
         b, c = (basis.power(2) for basis in self.bases)
@@ -110,6 +116,15 @@ class FaceRule:
     def stiffness(self, component: int) -> float:
         """Return the integral of alpha over the face."""
         return float(self.measure.sum())
+
+
+def on_layer(table: csr_array, layer: tuple[int | slice, ...], shape: tuple[int, ...]) -> csr_array:
+    """Return a table (m, ..) of the functions of a layer as one (m, n_u n_v n_w) of all functions of a component.
+
+    layer: its index in an array (n_u, n_v, n_w). shape: (c, n_u, n_v, n_w).
+    """
+    numbers = np.arange(math.prod(shape[1:])).reshape(shape[1:])[layer].ravel()
+    return csr_array((table.data, numbers[table.indices], table.indptr), shape=(table.shape[0], math.prod(shape[1:])))
 
 
 def has_face(space: TrialSpace, name: str) -> bool:

@@ -3,12 +3,13 @@
 Their factors (q_u, .., q_w, q_v) are parts of an array (k, q_u, .., q_w, q_v), which compiled kernels pass.
 """
 
-from collections.abc import Collection, Hashable, Sequence
+from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
+from scipy.sparse import coo_array, csr_array
 
 from parameterize.arrays import Array, IntArray
 from parameterize.spline.volume import BSplineVolume
@@ -16,7 +17,7 @@ from parameterize.spline.volume import BSplineVolume
 from ..forms.form import Form
 from . import group_kernels
 from .groups import Layout, OnPatches
-from .operator import FaceTerm, Source, assemble_stack, multiply_law
+from .operator import Source, assemble_stack, multiply_law
 from .quadrature import GaussRule
 from .space import TrialSpace
 from .stack import Piece, Stack, Stacked, stacks_of
@@ -95,19 +96,28 @@ class BodyMatrix:
             matrix.add_product(*groups[matrix.group])
         for patch in self.alone:
             result[patch][:] = self.parts[patch].apply(source[patch])
-        self.add_faces(source, result, self.alone)
+        result.flat[:] += self._of_faces @ source.flat
         return result
 
-    def add_faces(self, coefficients: OnPatches, result: OnPatches, left_out: Collection[int] = ()) -> None:
-        """Add the products of the terms on faces, but those of some patches, to a result."""
-        for patch, face in self._faces:
-            if patch not in left_out:
+    def add_faces(self, coefficients: OnPatches, result: OnPatches) -> None:
+        """Add the products of the terms on faces, of all patches, to a result."""
+        result.flat[:] += self._of_faces @ coefficients.flat
+        for patch in self.alone:
+            for face in self.parts[patch].faces.values():
                 face.add_product(coefficients[patch], result[patch])
 
     @cached_property
-    def _faces(self) -> list[tuple[int, FaceTerm]]:
-        """Return the terms on faces with the number of the patch."""
-        return [(i, face) for i, own in enumerate(self.parts) for face in own.faces.values()]
+    def _of_faces(self) -> csr_array:
+        """Return the matrix of the terms on faces of the patches in stacks, of all coefficients as one vector."""
+        components, starts, alone = self.laws[0].form.components, self.layout.starts, set(self.alone)
+        terms = [(i, face) for i, own in enumerate(self.parts) if i not in alone for face in own.faces.values()]
+        found = [(components * starts[i], face.matrix((components, *self.layout.shapes[i]))) for i, face in terms]
+        rows, columns = (
+            np.concatenate([np.zeros(0, dtype=np.int64), *(first + own.coords[axis] for first, own in found)])
+            for axis in (0, 1)
+        )
+        values = np.concatenate([np.zeros(0), *(own.data for _, own in found)])
+        return coo_array((values, (rows, columns)), shape=(components * starts[-1],) * 2).tocsr()
 
     @property
     def every_stack(self) -> list[tuple[Stack, int, IntArray]]:

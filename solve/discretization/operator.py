@@ -12,6 +12,7 @@ from functools import cached_property
 from typing import Any, Protocol
 
 import numpy as np
+from scipy.sparse import coo_array
 
 from parameterize.arrays import Array, IntArray
 from parameterize.spline.bspline import collocation
@@ -34,6 +35,9 @@ class FaceTerm(Protocol):
 
     def add_product(self, coefficients: Array, result: Array) -> None:
         """Add the product of the terms and coefficients (c, n_u, n_v, n_w) to a result of the same shape."""
+
+    def matrix(self, shape: tuple[int, ...]) -> coo_array:
+        """Return the matrix of the terms for coefficients of a shape (c, n_u, n_v, n_w) as a vector."""
 
     def add_diagonal(self, component: int, diagonal: Array) -> None:
         """Add the diagonal of a component's block to an array (n_u, n_v, n_w)."""

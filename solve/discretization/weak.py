@@ -15,13 +15,14 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from scipy.sparse import csr_array
+from scipy.sparse import block_array, coo_array, csr_array, diags_array, eye_array, kron
 
 from parameterize.arrays import Array, IntArray
 from parameterize.spline.volume import FACE_NAMES
 
 from ..field import Points
 from ..forms.form import Form
+from .face_data import on_layer
 
 # Share of a component that is held: a plane face across another axis holds so little by rounding alone, and a patch
 # among others that it seemed to hold would be inverted with an eigenvalue of either sign.
@@ -86,8 +87,7 @@ class WeakFace:
         here, behind = (self._layer(coefficients, layer) for layer in self.layers)
         value, along_b, along_c = self.tables
         u, slopes = value @ here, [self.slope * (value @ (here - behind)), along_b @ here, along_c @ here]
-        order = [self.axis, *(a for a in range(3) if a != self.axis)]
-        grad = np.einsum("amc,adm->cdm", np.stack(slopes), self.inverse[order])
+        grad = np.einsum("amc,adm->cdm", np.stack(slopes), self.inverse[self._order])
         return u.T, (self._flux(u.T, grad) * self.normal).sum(axis=1)
 
     def add_product(self, coefficients: Array, result: Array) -> None:
@@ -95,6 +95,44 @@ class WeakFace:
         u, flux = self.traces(coefficients)
         tested = np.einsum("cdm,dm->cm", self.stiff, u) - np.einsum("cdm,dm->cm", self.held, flux)
         self._spread(tested, -np.einsum("cdm,dm->cm", self.held, u), result)
+
+    def matrix(self, shape: tuple[int, ...]) -> coo_array:
+        """Return the matrix of the terms for coefficients of a shape (c, n_u, n_v, n_w) as a vector."""
+        one = eye_array(shape[0])
+        here, behind = (on_layer(self.tables[0], layer, shape) for layer in self.layers)
+        values = kron(one, here, format="csr")
+        found = values.T @ _at_points(self.stiff) @ values
+        if self.held.any():
+            along = (on_layer(table, self.layers[0], shape) for table in self.tables[1:])
+            slopes = [kron(one, table, format="csr") for table in (self.slope * (here - behind), *along)]
+            tests, (by_value, *by_slopes) = self._tests, self._traces
+            test = sum(_at_points(own) @ slope for own, slope in zip(tests, slopes, strict=True))
+            trace = sum(_at_points(own) @ slope for own, slope in zip(by_slopes, slopes, strict=True))
+            trace = trace + _at_points(by_value) @ values
+            held = _at_points(self.held)
+            found = found - values.T @ held @ trace - test.T @ held @ values
+        return found.tocoo()
+
+    @property
+    def _order(self) -> list[int]:
+        """Return the direction across the face, and the two along it."""
+        return [self.axis, *(a for a in range(3) if a != self.axis)]
+
+    @property
+    def _traces(self) -> list[Array]:
+        """Return the derivatives (c, c, m) of t by u, and by the slopes of u across and along the face."""
+        units = np.eye(len(self.projector))[:, :, None] * np.ones(len(self.weights))
+        none = np.zeros_like(units[0])
+        pairs = [[(unit, none[:, None] * self.normal) for unit in units]]
+        pairs += [[(none, unit[:, None] * axis) for unit in units] for axis in self.inverse[self._order]]
+        return [np.stack([(self._flux(*one) * self.normal).sum(axis=1) for one in own], axis=1) for own in pairs]
+
+    @property
+    def _tests(self) -> list[Array]:
+        """Return the derivatives (c, c, m) of the test functions' t by their slopes across and along the face."""
+        units = np.eye(len(self.projector))[:, :, None] * np.ones(len(self.weights))
+        pulled = np.stack([self._pulled(unit) for unit in units])
+        return [pulled[:, :, axis] for axis in self._order]
 
     def add_load(self, load: Array) -> None:
         """Add the terms of the right-hand side to a load (c, n_u, n_v, n_w)."""
@@ -165,3 +203,8 @@ class WeakFace:
         for layer, part in zip(self.layers, (here, -across), strict=True):
             target = result[:, *layer]
             target += part.T.reshape(target.shape)
+
+
+def _at_points(factors: Array) -> csr_array:
+    """Return the matrix (c m, c m) of factors (c, c, m) at points."""
+    return block_array([[diags_array(own) for own in row] for row in factors], format="csr")
