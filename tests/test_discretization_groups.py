@@ -120,3 +120,35 @@ def test_errors_of_a_body_are_those_of_its_patches(counts):
     assert whole.h1_seminorm**2 == pytest.approx(sum(one.h1_seminorm**2 for one in each), rel=1e-12)
     size = sum((one.h1_seminorm / one.h1_relative) ** 2 for one in each) ** 0.5
     assert whole.h1_relative == pytest.approx(whole.h1_seminorm / size, rel=1e-12)
+
+
+class Windy(iga_nn.Form):
+    """A law that is not symmetric, with u in its flux."""
+
+    symmetric = False
+
+    def flux(self, u, grad, x):
+        return np.stack([grad[:, 0] + 0.3 * grad[:, 1] + 0.2 * u, grad[:, 1] - 0.1 * grad[:, 0], grad[:, 2]], axis=1)
+
+
+ON_FACES = {
+    "weak": iga_nn.Elasticity(fix="x < 0.2 and z < 0.6", roller="w1", spring={"y > 0.9 and x > 1": 3.0}),
+    "robin": iga_nn.Poisson(source="1", neumann={"w0": "0"}, robin={"v1": ("2", "0")}),
+    "not symmetric": iga_nn.Problem(
+        Windy(), source="1", conditions=[iga_nn.Value("x < 0.3", "1"), iga_nn.Exchange("z > 0.9 and x > 1", 2.0, 1.0)]
+    ),
+}
+
+
+@pytest.mark.parametrize("problem", ON_FACES.values(), ids=ON_FACES)
+def test_the_matrix_of_terms_on_faces_is_that_of_their_products(problem):
+    matrix = iga_nn.discretize(row_of((3, 4, 3)), problem).matrix
+    x = matrix.layout.empty(problem.form.components)
+    x.flat[:] = np.random.default_rng(0).standard_normal(x.flat.shape)
+    found, expected = 0.0 * x, 0.0 * x
+    matrix.add_faces(x, found)
+    for own, coefficients, total in zip(matrix.parts, x, expected, strict=True):
+        for face in own.faces.values():
+            face.add_product(coefficients, total)
+    assert np.abs(expected.flat).max() > 0.01
+    assert found.flat == pytest.approx(expected.flat, abs=1e-12 * np.abs(expected.flat).max())
