@@ -6,10 +6,12 @@ that are trilinear on each patch, moves patches that no boundary data hold as a 
 Decomposition Methods, 2005, sections 2.2 and 5).
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.sparse import coo_array, csc_array, diags_array
+from scipy.sparse.linalg import splu
 
 from parameterize.arrays import Array, IntArray
 from parameterize.spline.body import shared_numbers
@@ -23,6 +25,9 @@ from ..discretization.unknowns import Glued
 from .preconditioner import FastDiagonalization
 from .stacked import StackedDiagonalization, along_axes, diagonalizations
 
+Inverse = Callable[[Array], Array]
+
+DENSE = 500  # vertices up to which the coarse matrix is inverted, beyond it is factorized
 RANK = 1e-10  # of the largest eigenvalue of the coarse matrix: smaller ones belong to motions that nothing resists
 
 
@@ -89,14 +94,15 @@ class GluedPreconditioner:
 class Coarse:
     """Solve on the functions that are trilinear on each patch, given by their values at the free vertices.
 
-    hats: for each group the values of the vertices' functions along the three directions, (g, n, 2) each. inverse: (v,
-    v), of Galerkin's matrix. vertices: for each group the places (g, 2, 2, 2) of the vertices of its patches, v where
-    they are fixed.
+    hats: for each group the values of the vertices' functions along the three directions, (g, n, 2) each. vertices: for
+    each group the places (g, 2, 2, 2) of the vertices of its patches, `count` where they are fixed. inverse: that of
+    Galerkin's matrix. count: the number of free vertices.
     """
 
     hats: Sequence[tuple[Array, Array, Array]]
     vertices: Sequence[IntArray]
-    inverse: Array
+    inverse: Inverse
+    count: int
 
     @classmethod
     def of(cls, unknowns: Glued, operators: Sequence[Operator], interfaces: Sequence[Interface]) -> "Coarse":
@@ -110,12 +116,11 @@ class Coarse:
         order = np.where(fixed, free, np.cumsum(~fixed) - 1)
         places = order[np.stack(numbers)]
         flat = places.reshape(-1, 8)
-        matrix = np.zeros((free + 1, free + 1))
-        np.add.at(matrix, (flat[:, :, None], flat[:, None, :]), galerkin(operators))  # a vertex may be there twice
+        entries = galerkin(operators).ravel(), (np.repeat(flat, 8, axis=1).ravel(), np.tile(flat, 8).ravel())
+        matrix = coo_array(entries, shape=(free + 1,) * 2).tocsc()[:-1, :-1]  # copies of a vertex are added
         groups = [np.array(group) for group in unknowns.layout.groups]
         hats = [_hats([operators[number].space for number in group]) for group in groups]
-        inverse = np.linalg.pinv(matrix[:-1, :-1], rcond=RANK, hermitian=True)
-        return cls(hats, [places[group] for group in groups], np.asarray(inverse, dtype=np.float64))
+        return cls(hats, [places[group] for group in groups], _inverse(matrix), free)
 
     def __call__(self, shares: OnPatches) -> OnPatches:
         """Return V (V^T A V)^+ V^T r as coefficients (1, n_u, n_v, n_w) of each patch.
@@ -123,16 +128,26 @@ class Coarse:
         shares: r, divided among the patches.
         """
         result = shares.layout.empty(1)
-        if not len(self.inverse):
+        if not self.count:
             return result
-        right = np.zeros(len(self.inverse) + 1)
+        right = np.zeros(self.count + 1)
         for (u, v, w), places, share in zip(self.hats, self.vertices, shares.in_groups, strict=True):
             at_vertices = along_axes(u.mT, v.mT, w.mT, share[:, 0])
             right += np.bincount(places.ravel(), at_vertices.ravel(), len(right))
-        values = np.append(self.inverse @ right[:-1], 0.0)
+        values = np.append(self.inverse(right[:-1]), 0.0)
         for (u, v, w), places, total in zip(self.hats, self.vertices, result.in_groups, strict=True):
             total[:, 0] = along_axes(u, v, w, values[places])
         return result
+
+
+def _inverse(matrix: csc_array) -> Inverse:
+    """Return the inverse of a matrix (v, v) without the motions that nothing resists; of a large one, with a share."""
+    if matrix.shape[0] <= DENSE:
+        inverse = np.asarray(np.linalg.pinv(matrix.toarray(), rcond=RANK, hermitian=True), dtype=np.float64)
+        return lambda right: np.asarray(inverse @ right)
+    shifted = (matrix + RANK * diags_array(matrix.diagonal())).tocsc()
+    factor = splu(shifted, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
+    return lambda right: np.asarray(factor.solve(right))
 
 
 def shares_of(unknowns: Glued, diagonals: Sequence[Array]) -> OnPatches:
