@@ -15,9 +15,8 @@ from numpy.typing import ArrayLike
 
 from parameterize.arrays import Array, IntArray, in_brackets
 from parameterize.spline.bspline import breakpoints, divided_spans, evaluate_at, real_array
-from parameterize.spline.volume import BSplineVolume
+from parameterize.spline.volume import UNITS, BSplineVolume
 
-from .discretization.estimate import FIRST
 from .field import FieldOnBody, Points, SplineField
 from .field_groups import FieldGroup, groups_of
 from .forms.form import Form, Quantity
@@ -102,7 +101,7 @@ def _values(field: SplineField, quantity: Quantity, where: Array) -> Array:
     """Return a quantity (..., m) at parameters (m, 3)."""
     volume = volume_of(field)
     spline = (field.degrees, field.knots, _vectors(field), where)
-    slopes = np.stack([evaluate_at(*spline, order) for order in FIRST], axis=-1)  # (m, c, 3)
+    slopes = np.stack([evaluate_at(*spline, order) for order in UNITS], axis=-1)  # (m, c, 3)
     return _evaluated(
         quantity,
         np.moveaxis(evaluate_at(*spline), 0, -1),

@@ -20,12 +20,13 @@ from parameterize.threads import one_blas_thread
 from .assembly import Assembled, assemble_body_data, balanced
 from .diagnostics import ConvergenceError, failure, folded_notices, judge, map_notices
 from .discretization.error_norms import Compared, Errors, error_norms, missing_mean
-from .discretization.estimate import error_estimate
+from .discretization.estimate import error_estimate, estimated_squares, why_not_estimated
 from .discretization.grouped import BodyMatrix, Law, assemble_body
 from .discretization.on_regions import demand_area, demand_supports
 from .discretization.operator import FormOperator, Operator
 from .discretization.processes import Processes
 from .discretization.quadrature import GaussRule, operator_rule
+from .discretization.residual import Solved
 from .discretization.space import embedded, longest_edges
 from .discretization.unknowns import Glued, Unknowns, unknowns_of
 from .field import BodyField, FieldOnBody, SplineField
@@ -40,7 +41,6 @@ from .reactions import balance
 from .solution import Solution, SolveReport
 
 LARGEST_VALUE = 1e150  # of a solution: the squares of larger ones overflow
-CONTINUOUS = "the error is not estimated: across interfaces of patches the gradient jumps; compare two refinements"
 
 log = logging.getLogger(__name__)
 
@@ -229,8 +229,8 @@ class System:
         doubtful, meaningful = judge(problem, self.stated, errors, estimate if result.converged else None, dofs)
         if errors is None and problem.form.caveat:
             doubtful.append(f"the error is not estimated: {problem.form.caveat}; compare two refinements")
-        elif errors is None and len(self.stated) > 1:
-            doubtful.append(CONTINUOUS)
+        elif errors is None and len(self.stated) > 1 and (why := self._unknown):
+            doubtful.append(f"the error is not estimated: {why}; compare two refinements")
         if not has_norm:
             doubtful.append(f"the solution reaches {largest:.1e}, too large for its norms: choose other units")
         weaknesses = [text for own in processes.shared([block.weakness for block in self.blocks]) for text in own]
@@ -281,15 +281,33 @@ class System:
         """Return the errors of a solution, None without an exact one, and their estimate, None unless it is wanted.
 
         full: all coefficients of each patch. free: the free coefficients. is_estimated: whether to estimate; None for
-        problems without an exact solution only. On several patches there is no estimate.
+        problems without an exact solution only.
         """
         errors = estimate = None
         if self.problem.exact is not None:
             errors = error_norms(self._parts(full), self.patches[0].matrix.threads, self.unknowns.processes)
-        if len(self.stated) == 1 and (is_estimated or (is_estimated is None and self.problem.exact is None)):
-            (patch,) = self.patches
-            estimate = error_estimate(patch.volume, patch.space, full[0], patch.problem, self._energy(free))
+        is_wanted = self.problem.exact is None if is_estimated is None else is_estimated
+        if is_wanted and not self._unknown:
+            solved, processes = self._solved(full), self.unknowns.processes
+            with self.unknowns.agreed(), solved[0].space.agreed():
+                squares = estimated_squares(solved, self.body.interfaces)
+            estimate = error_estimate(processes.total(squares), self._energy(free))
         return errors, estimate
+
+    @property
+    def _unknown(self) -> str:
+        """Return why the error cannot be estimated; "" where it can."""
+        return why_not_estimated([patch.space for patch in self.stated], [patch.problem for patch in self.stated])
+
+    def _solved(self, full: Sequence[Array]) -> list[Solved]:
+        """Return the solution on each patch, of one cube that processes share on their rows."""
+        if self.body.is_single:
+            return [Solved(own.volume, own.space, own.problem, full[0], own.weak) for own in self.patches]
+        weak = dict(zip(self.unknowns.patches, (own.weak for own in self.patches), strict=True))
+        return [
+            Solved(one.volume, one.space, one.problem, whole, weak.get(number, ()), number in weak)
+            for number, (one, whole) in enumerate(zip(self.stated, self.unknowns.whole(full), strict=True))
+        ]
 
     def _energy(self, free: Array) -> float | None:
         """Return a(u_h, u_h) of free coefficients that solve the system; None where it is not the work of the loads."""

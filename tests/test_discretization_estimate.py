@@ -7,7 +7,7 @@ from volumes import bent
 from parameterize.spline.bspline import breakpoints, gauss_points, greville, open_uniform_knots
 from parameterize.spline.volume import FACE_NAMES, BSplineVolume
 from solve import Elasticity, Form, Poisson, Problem, benchmark_volume, solve_problem
-from solve.discretization.estimate import lowest_waves
+from solve.discretization.waves import lowest_waves
 
 WAVE = "exp(x+z)*sin(y)"
 TENSOR = ("2+x*x", "0.3*y", "0.1", "1.5", "0.2*sin(z)", "1+z*z")

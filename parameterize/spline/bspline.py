@@ -180,6 +180,17 @@ def divided_spans(knots: Array, parts: int) -> Array:
     return np.interp(np.arange(parts * (len(breaks) - 1) + 1) / parts, np.arange(len(breaks)), breaks)
 
 
+def between(knots: Array, degree: int, low: float, high: float) -> tuple[slice, Array]:
+    """Return which coefficients are those of the part between two knots, and the part's knots, from 0 to 1.
+
+    Splines must be only continuous at both knots, or end there.
+    """
+    first = int(np.searchsorted(knots, low, side="right")) - 1 - degree
+    last = int(np.searchsorted(knots, high))
+    inner = (knots[first + degree + 1 : last] - low) / (high - low)
+    return slice(first, last), np.concatenate([np.zeros(degree + 1), inner, np.ones(degree + 1)])
+
+
 def midpoints(knots: Array) -> Array:
     """Return the middle of every span."""
     breaks = breakpoints(knots)

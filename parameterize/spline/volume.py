@@ -16,6 +16,7 @@ from ..display import Brief, Shown, above
 from ..files import load_arrays, save_arrays
 from .bspline import (
     apply_along,
+    between,
     check_knots,
     evaluate_at,
     evaluate_grid,
@@ -300,15 +301,10 @@ class BSplineVolume(Brief, Shown):
 
     def _between(self, ends: Sequence[tuple[float, float]]) -> "BSplineVolume":
         """Return the part between two parameters in each direction, at which the spline is only continuous."""
-        window, rows = [], []
-        for row, degree, (low, high) in zip(self.knots, self.degrees, ends, strict=True):
-            first = int(np.searchsorted(row, low, side="right")) - 1 - degree
-            last = int(np.searchsorted(row, high))
-            inner = (row[first + degree + 1 : last] - low) / (high - low)
-            window.append(slice(first, last))
-            rows.append(np.concatenate([np.zeros(degree + 1), inner, np.ones(degree + 1)]))
-        weights = None if self.weights is None else self.weights[tuple(window)]
-        return BSplineVolume(self.degrees, (rows[0], rows[1], rows[2]), self.control_points[tuple(window)], weights)
+        parts = zip(self.knots, self.degrees, ends, strict=True)
+        window, rows = zip(*(between(row, degree, *own) for row, degree, own in parts), strict=True)
+        weights = None if self.weights is None else self.weights[window]
+        return BSplineVolume(self.degrees, rows, self.control_points[window], weights)
 
     def face(self, axis: int, side: int) -> Array:
         """Return the control points of a boundary face, e.g. (n_v, n_w, 3) for axis 0; side 0 or 1."""

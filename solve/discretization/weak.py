@@ -78,6 +78,12 @@ class WeakFace:
         """Return the direction across the face."""
         return FACE_NAMES.index(self.name) // 2
 
+    @property
+    def places(self) -> Array:
+        """Return the parameters (m, 3) of the points."""
+        assert self.x.places is not None
+        return self.x.places
+
     def holds(self, condition: int) -> Any:
         """Return the mask (m,) of the points where the condition with this number holds."""
         return self.codes >> (condition + 1) & 1 == 1

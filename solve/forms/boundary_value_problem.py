@@ -220,6 +220,17 @@ class BoundaryValueProblem:
         found = (one for one in self._all if isinstance(one, Value) and one.is_strong)
         return next((one for one in found if not names.isdisjoint(one.faces)), None)
 
+    def key_on(self, face: str) -> Hashable:
+        """Return what is equal for the patches of a body with the same data on a face, beside `in_volume`."""
+        found = self._of(face) or self.strong_on(face)
+        entries = () if found is None else (id(entry) for datum in found.parsed.values() for entry in datum.entries)
+        return type(found), *entries
+
+    @property
+    def has_fields(self) -> bool:
+        """Return whether fields are among the data, which are evaluated at parameters of one patch."""
+        return any(isinstance(entry, FieldOnBody) for _, datum in self._datums for entry in datum.entries)
+
     def demand_held(self) -> None:
         """Raise ValueError where the data alone show that nothing fixes the solution."""
 
@@ -286,6 +297,10 @@ class BoundaryValueProblem:
 
     def _exact_jets(self, x: Array, hessian: Numbers = (0.0,) * 6) -> list[Jet]:
         return [formula.jet(coordinates(np.asarray(x), hessian)) for formula in self.exact_formulas]
+
+    def is_held(self, face: str) -> bool:
+        """Return whether the data of a whole face answer loads: values of u, or a flux that depends on u."""
+        return face in self.dirichlet or any(face in one.faces for one in self.faces if one.is_support)
 
     def boundary_at(self, x: Array, face: str) -> Array:
         """Return the values of u (c, ...) given on a face, or the values of `exact`, or zero."""

@@ -130,14 +130,19 @@ class Form:
             columns.append((flux * wave).sum(axis=1))
         return _symmetric(columns)
 
-    def symbol(self, wave: Array, x: Array) -> Array:
-        """Return the least factor (...) by which the law multiplies waves exp(i k . x) with wave vectors k (3, ...)."""
+    def matrix_of_wave(self, wave: Array, x: Array) -> Array:
+        """Return the symmetric part (..., c, c) by which the law multiplies waves d exp(i k . x), k (3, ...)."""
         matrix = self.matrix_along(wave, x)
         if self.has_reaction:
             units = np.eye(self.components).reshape(self.components, -1, *(1,) * (wave.ndim - 1))
             none = np.zeros((self.components, 3, *wave.shape[1:]))
             ones = np.ones(wave.shape[1:])
             matrix = matrix + _symmetric([reaction(self, unit * ones, none, x) for unit in units])
+        return matrix
+
+    def symbol(self, wave: Array, x: Array) -> Array:
+        """Return the least factor (...) by which the law multiplies waves exp(i k . x) with wave vectors k (3, ...)."""
+        matrix = self.matrix_of_wave(wave, x)
         least = matrix[..., 0, 0] if self.components == 1 else np.linalg.eigvalsh(matrix)[..., 0]
         return np.asarray(least, dtype=np.float64)
 
