@@ -164,7 +164,8 @@ def _surface_rules(body: Domain, over: Regions) -> Iterator[tuple[Patch, Surface
             def codes(x: Array, normal: Array, name: str = name) -> IntArray:
                 return np.any([region.holds(x, normal, name) for region in regions], axis=0).astype(np.int64)
 
-            rule = surface_rule(_volume_of(patch), space, *axis_side(face), codes)
+            needs_normal = any(region.needs_normal for region in regions)
+            rule = surface_rule(_volume_of(patch), space, *axis_side(face), codes, needs_normal=needs_normal)
             if rule is not None:
                 found = True
                 yield patch, rule

@@ -27,7 +27,7 @@ from .forms.boundary_value_problem import BoundaryValueProblem
 from .forms.data import Data, parse
 from .forms.frame import UnitFrame
 from .linear.krylov import generalized_residuals
-from .options import IterationOptions, SolveOptions
+from .options import SolveOptions
 from .patch_system import PatchProblem
 from .solver import prepared
 from .system import System, coefficients_in, field_of, system_of
@@ -272,17 +272,15 @@ class _Path:
 
     def step(self, time: float) -> int:
         """March to a time, and return the number of iterations. Raises ConvergenceError."""
-        new = self.data.at(time)
-        system, right = self._equation(new.loads)
-        unknowns = self.data.unknowns
-        free = unknowns.collect(right - system.matrix.apply(new.known))
-        found = _solved(system, free, unknowns.chosen(self._guess), self.data.options)
+        new, unknowns = self.data.at(time), self.data.unknowns
+        known, right = new.known, self._right(new.loads)
+        found = self._solved(unknowns.collect(right - self._product(known)), unknowns.chosen(self._guess))
         if not found.converged:
             raise ConvergenceError(
                 f"march: no convergence at time {time:g}, residual {found.residuals[-1]:.1e} after {found.iterations} "
                 "iterations: raise max_iterations or the tolerance"
             )
-        self.time, self.before, self.last, self.load = time, self.last, self.data.filled(found.x, new.known), new.loads
+        self.time, self.before, self.last, self.load = time, self.last, self.data.filled(found.x, known), new.loads
         log.info("time %g: %d iterations", time, found.iterations)
         return found.iterations
 
@@ -291,19 +289,33 @@ class _Path:
         """Return the coefficients on the line through the earlier and the last ones."""
         return self.last if self.before is None else 2.0 * self.last - self.before
 
-    def _equation(self, load: OnPatches) -> tuple[System, OnPatches]:
-        """Return the system of a step and its right-hand side on all patches."""
+    @property
+    def _is_euler(self) -> bool:
+        """Return whether the next step is Euler's, the first one of BDF2."""
+        return self.scheme == "bdf2" and self.before is None
+
+    def _right(self, load: OnPatches) -> OnPatches:
+        """Return the right-hand side of a step on all patches."""
         if self.scheme == "trapezoidal":  # f_new + f + (s M - A) last, s = 2 / dt: that of (A + s M) new
             shift = 2.0 * FACTORS[self.scheme] * self.rate
-            shifted = self.system.matrix.apply(self.last)
-            return self.system, load + self.load + shift * self.mass.apply(self.last) - shifted
+            return load + self.load + shift * self.mass.apply(self.last) - self.system.matrix.apply(self.last)
         if self.before is None:
-            rate = EULER * self.rate
-            return self.data.system(rate), load + rate * self.mass.apply(self.last)
-        return self.system, load + 0.5 * self.rate * self.mass.apply(4.0 * self.last - self.before)
+            return load + EULER * self.rate * self.mass.apply(self.last)
+        return load + 0.5 * self.rate * self.mass.apply(4.0 * self.last - self.before)
 
+    def _product(self, x: OnPatches) -> OnPatches:
+        """Return the matrix of a step times all coefficients: that of the system, and less of the mass for Euler's."""
+        product = self.system.matrix.apply(x)
+        if not self._is_euler:
+            return product
+        return product - (FACTORS[self.scheme] - EULER) * self.rate * self.mass.apply(x)
 
-def _solved(system: System, right: Array, guess: Array, options: IterationOptions) -> LinearResult:
-    """Return the solution of a step's system from an initial guess; all arrays have the shape (c, m_u, m_v, m_w)."""
-    solver = conjugate_gradients if system.problem.form.symmetric else generalized_residuals
-    return solver(system.product, right, system.precondition, options.tolerance, options.max_iterations, guess)
+    def _solved(self, right: Array, guess: Array) -> LinearResult:
+        """Return the solution of a step from an initial guess; all arrays have the shape (c, m_u, m_v, m_w)."""
+        unknowns, options, joined = self.data.unknowns, self.data.options, self.last.layout.joined
+        solver = conjugate_gradients if self.system.problem.form.symmetric else generalized_residuals
+
+        def product(x: Array) -> Array:
+            return unknowns.collect(self._product(joined(unknowns.spread(x))))
+
+        return solver(product, right, self.system.precondition, options.tolerance, options.max_iterations, guess)

@@ -31,13 +31,15 @@ def test_the_matrix_is_symmetric_and_positive_on_any_region(text, problem):
     assert np.linalg.eigvalsh(matrix)[0] > 0.0
     if scalar:
         diagonal = np.stack([system.patches[0].matrix.diagonal()])
-        assert np.diag(matrix).reshape(system.right.shape) == pytest.approx(diagonal[:, *system.space.window])
+        assert np.diag(matrix).reshape(system.right.shape) == pytest.approx(
+            diagonal[:, *system.patches[0].space.window]
+        )
 
 
 def test_the_block_of_a_component_has_the_diagonal_of_the_matrix(coarse_regions):
     system = discretize(QUADRATIC, Elasticity(exact=BODY, roller="x + y < 0.3 or nz > 0.5", fix="z < 0"))
     matrix = (system.operator @ np.eye(len(system.load))).diagonal().reshape(system.right.shape)
-    blocks = [system.patches[0].matrix.block(i).diagonal()[system.space.window] for i in range(3)]
+    blocks = [system.patches[0].matrix.block(i).diagonal()[system.patches[0].space.window] for i in range(3)]
     assert matrix == pytest.approx(np.stack(blocks), rel=1e-8)
 
 

@@ -96,15 +96,19 @@ class BodyMatrix:
             matrix.add_product(*groups[matrix.group])
         for patch in self.alone:
             result[patch][:] = self.parts[patch].apply(source[patch])
-        result.flat[:] += self._of_faces @ source.flat
+        self._add_stacked_faces(source, result)
         return result
 
     def add_faces(self, coefficients: OnPatches, result: OnPatches) -> None:
         """Add the products of the terms on faces, of all patches, to a result."""
-        result.flat[:] += self._of_faces @ coefficients.flat
+        self._add_stacked_faces(coefficients, result)
         for patch in self.alone:
             for face in self.parts[patch].faces.values():
                 face.add_product(coefficients[patch], result[patch])
+
+    def _add_stacked_faces(self, coefficients: OnPatches, result: OnPatches) -> None:
+        if self._of_faces.nnz:
+            result.flat[:] += self._of_faces @ coefficients.flat
 
     @cached_property
     def _of_faces(self) -> csr_array:

@@ -44,7 +44,8 @@ def weak_faces(volume: BSplineVolume, problem: BoundaryValueProblem, space: Tria
     """
     if len(problem.conditions) > MOST:
         raise ValueError(f"at most {MOST} regions, got {len(problem.conditions)}")
-    frames = [condition.region.frame for condition in problem.conditions]
+    regions = [condition.region for condition in problem.conditions]
+    needs_normal, frames = any(one.needs_normal for one in regions), [one.frame for one in regions]
     length = next((frame.length for frame in frames if frame is not None), None)
     found = []
     for name in FACE_NAMES:
@@ -52,7 +53,7 @@ def weak_faces(volume: BSplineVolume, problem: BoundaryValueProblem, space: Tria
         if not has_face(space, name) or strong is not None and not _may_overlap(problem, name, strong):
             continue
         axis, side = axis_side(name)
-        rule = surface_rule(volume, space, axis, side, _coder(problem, name, strong), length)
+        rule = surface_rule(volume, space, axis, side, _coder(problem, name, strong), length, needs_normal)
         if rule is None:
             continue
         builder = _Builder(volume, problem, space, name, rule)

@@ -8,6 +8,7 @@ same way, this is exact to high order; where the rim ends or bends between lines
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -74,9 +75,17 @@ class SurfaceRule:
 
 
 def surface_rule(
-    volume: BSplineVolume, space: TrialSpace, axis: int, side: int, codes: Codes, length: float | None = None
+    volume: BSplineVolume,
+    space: TrialSpace,
+    axis: int,
+    side: int,
+    codes: Codes,
+    length: float | None = None,
+    needs_normal: bool = True,
 ) -> SurfaceRule | None:
     """Return the rule of a face, without the points whose code is zero; None where all codes are zero.
+
+    needs_normal: whether codes depend on normals; others get zeros for them, in a third of the time.
 
     length: the cube root of the body's volume; faces that are smaller, as those of many blocks, are looked at no more
     closely than those of one cube.
@@ -86,7 +95,8 @@ def surface_rule(
     """
     size = float(np.linalg.norm(np.ptp(volume.face(axis, side).reshape(-1, 3), axis=0)))
     share = 1.0 if length is None else min(1.0, size / (np.sqrt(2.0) * length))
-    whole = _Cutter(volume, orientation(volume), space.whole, axis, side, codes, int(np.ceil(share * FEWEST))).rule()
+    fewest = int(np.ceil(share * FEWEST))
+    whole = _Cutter(volume, space.whole, axis, side, codes, fewest, needs_normal).rule()
     if whole is None or space.whole is space:
         return whole
     u, (first, *_, last) = whole.at.parameters[:, 0], space.breaks[0]
@@ -96,12 +106,17 @@ def surface_rule(
 @dataclass(frozen=True, eq=False)
 class _Cutter:
     volume: BSplineVolume
-    hand: int
     space: TrialSpace
     axis: int
     side: int
     codes: Codes
     fewest: int
+    needs_normal: bool
+
+    @cached_property
+    def hand(self) -> int:
+        """Return the orientation of the map."""
+        return orientation(self.volume)
 
     def rule(self) -> SurfaceRule | None:
         """Return the quadrature rule of the face."""
@@ -140,7 +155,7 @@ class _Cutter:
                 t = _with_ends(_unit_rule(max(self.space.degrees) + 1)[0])
                 grid = np.stack(np.meshgrid(np.linspace(0.0, 1.0, PIECES + 1), t, indexing="ij"), axis=-1)
                 points = _placed(cells[chosen][:, None, None], grid if along == 0 else grid[..., ::-1])
-                seen = self._code(points.reshape(-1, 2))[1].reshape(points.shape[:3])
+                seen = self._code(points.reshape(-1, 2)).reshape(points.shape[:3])
                 jumps = np.count_nonzero(np.diff(seen, axis=1), axis=1)
                 marks = np.stack([seen[:, 0], seen[:, -1], jumps], axis=-1)
                 bent[chosen] = (marks != marks[:, :1]).any(axis=(1, 2))
@@ -159,10 +174,13 @@ class _Cutter:
         high = np.stack(np.meshgrid(b[1:], c[1:], indexing="ij"), axis=-1).reshape(-1, 2)
         return np.stack([low, high], axis=1)
 
-    def _code(self, across: Array) -> tuple[FacePoints, IntArray]:
-        """Return the points with parameters (m, 2), and their codes (m,)."""
-        at = FacePoints.of(self.volume, self.hand, self.axis, self.side, across)
-        return at, self.codes(at.x, at.normal)
+    def _code(self, across: Array) -> IntArray:
+        """Return the codes (m,) of points with parameters (m, 2)."""
+        if self.needs_normal:
+            at = FacePoints.of(self.volume, self.hand, self.axis, self.side, across)
+            return self.codes(at.x, at.normal)
+        x = self.volume(np.insert(across, self.axis, float(self.side), axis=1)).T
+        return self.codes(x, np.zeros_like(x))
 
     def _seen(self, cells: Array, samples: int) -> IntArray:
         """Return the codes (k, samples + 2, samples + 2) of cells on grids that contain their ends.
@@ -173,7 +191,7 @@ class _Cutter:
         t = np.linspace(-step, 1.0 + step, samples + 2)
         grid = np.stack(np.meshgrid(t, t, indexing="ij"), axis=-1)
         points = np.clip(_placed(cells[:, None, None], grid), 0.0, 1.0)
-        return self._code(points.reshape(-1, 2))[1].reshape(points.shape[:3])
+        return self._code(points.reshape(-1, 2)).reshape(points.shape[:3])
 
     def _gauss(self, cells: Array, codes: IntArray) -> SurfaceRule | None:
         """Return Gauss points on cells of one code each."""
@@ -215,7 +233,7 @@ class _Cutter:
             places = np.empty((len(s), 2))
             places[:, along], places[:, 1 - along] = s, fixed[line]
             across = low[line] + places * size[line]
-            return across, self._code(across)[1]
+            return across, self._code(across)
 
         lines = np.arange(len(low))
         s = np.linspace(0.0, 1.0, PIECES + 1)

@@ -175,6 +175,11 @@ class Region:
         return bool(self._of_part)
 
     @property
+    def needs_normal(self) -> bool:
+        """Return whether the condition depends on normals: by nx, ny, nz, or by a group or a face of the part."""
+        return not self._used.isdisjoint((*NORMAL, *self._of_part))
+
+    @property
     def _of_part(self) -> list[str]:
         """Return the marks that are groups or faces of the part."""
         return [f"_mark{i}" for i, entry in enumerate(self._marks) if entry.startswith(("group ", "face "))]
@@ -192,7 +197,7 @@ class Region:
             raise ExpressionError(f"region {self.text!r:.80}: X, Y, Z mean nothing without a volume")
         of_frame = scaled(self.frame, jets) if self.frame is not None else jets
         nearest = None
-        if self.surface is not None and not self._used.isdisjoint((*NORMAL, *self._of_part)):
+        if self.surface is not None and self.needs_normal:
             nearest = self.surface.nearest(x.reshape(3, -1).T, normal.reshape(3, -1).T).reshape(x.shape[1:])
             normal = np.moveaxis(self.surface.normals[nearest], -1, 0)
         values: list[Any] = [*jets, *of_frame, *_moved(normal, TOLERANCE)]
