@@ -28,6 +28,7 @@ from .forms.boundary_value_problem import BoundaryValueProblem
 from .forms.form import Form
 from .forms.problem import Problem
 from .linear.krylov import generalized_residuals
+from .linear.preconditioner import leaves_constants
 from .options import SolveOptions
 from .patch_system import PatchProblem, operators_of
 from .solution import Solution, SolveReport
@@ -167,14 +168,14 @@ class _Balance:
         on_regions = [face for own in matrix.parts for face in own.faces.values() if isinstance(face, WeakFace)]
         demand_area(problem, on_regions, patches[0].space, body.patches)
         if len(body.parts) > 1 and not problem.form.has_reaction:
-            operators = operators_of(matrix, loads.components)
+            free = np.array([all(map(leaves_constants, own)) for own in operators_of(matrix, loads.components)])
             for part in body.parts:
-                demand_fixed(part, [own for number in part for own in operators[number]], patches[0].space)
+                demand_fixed(part, free[list(part)], patches[0].space)
         unknowns = unknowns_of([patch.space for patch in patches], body.interfaces)
-        free = matrix.layout.joined(unknowns.spread(np.ones((loads.components, *unknowns.shape))))
+        ones = matrix.layout.joined(unknowns.spread(np.ones((loads.components, *unknowns.shape))))
         known = matrix.layout.joined(unknowns.completed(known))
         forces = Forces(matrix, [patch.problem.form for patch in patches])
-        return cls(body, unknowns, forces, loads, known, free.flat == 0.0, options, linear_iterations)
+        return cls(body, unknowns, forces, loads, known, ones.flat == 0.0, options, linear_iterations)
 
     def found(self, full: OnPatches, share: float, history: list[float]) -> OnPatches:
         """Return the coefficients for which the forces balance a share of the loads, starting from `full`.

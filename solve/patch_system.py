@@ -30,14 +30,12 @@ class PatchSystem(PatchProblem):
     """Hold the linear system of one patch.
 
     matrix: the products with all coefficients (c, n_u, n_v, n_w) of the patch. known: the coefficients that Dirichlet
-    data fix, zero elsewhere. loads: of all coefficients, before the known ones are subtracted. operators: the scalar
-    operator of each component, a single one where it serves all.
+    data fix, zero elsewhere. loads: of all coefficients, before the known ones are subtracted.
     """
 
     matrix: Operator | FormOperator
     known: Array
     loads: Array
-    operators: tuple[Operator, ...]
 
     @property
     def weak(self) -> list[WeakFace]:
@@ -51,19 +49,10 @@ class PatchSystem(PatchProblem):
 
 def systems_of(patches: Sequence[PatchProblem], found: Assembled) -> tuple[PatchSystem, ...]:
     """Return the systems of all patches from what is assembled on them."""
-    operators = operators_of(found.matrix, found.loads.components)
-    rows = zip(patches, found.matrix.parts, found.loads, found.known, operators, strict=True)
+    rows = zip(patches, found.matrix.parts, found.loads, found.known, strict=True)
     return tuple(
-        PatchSystem(
-            patch.volume,
-            patch.problem,
-            patch.space,
-            matrix=own,
-            known=known,
-            loads=loads,
-            operators=scalar,
-        )
-        for patch, own, loads, known, scalar in rows
+        PatchSystem(patch.volume, patch.problem, patch.space, matrix=own, known=known, loads=loads)
+        for patch, own, loads, known in rows
     )
 
 

@@ -10,11 +10,12 @@ from typing import Any
 import numpy as np
 from scipy.sparse.linalg import LinearOperator
 
-from parameterize.arrays import Array
+from parameterize.arrays import Array, Mask
 from parameterize.conjugate_gradients import LinearResult, conjugate_gradients
 from parameterize.spline.body import Body
 from parameterize.spline.bspline import greville
 from parameterize.spline.interface import Interface
+from parameterize.spline.volume import FACE_NAMES
 from parameterize.threads import one_blas_thread
 
 from .assembly import Assembled, assemble_body_data, balanced
@@ -28,15 +29,16 @@ from .discretization.processes import Processes
 from .discretization.quadrature import GaussRule, operator_rule
 from .discretization.residual import Solved
 from .discretization.space import embedded, longest_edges
-from .discretization.unknowns import Glued, Unknowns, unknowns_of
+from .discretization.unknowns import Glued, Unknowns, Window, unknowns_of
 from .field import BodyField, FieldOnBody, SplineField
 from .forms.boundary_value_problem import BoundaryValueProblem
 from .forms.mass import Mass
 from .linear.glued import GluedPreconditioner
 from .linear.krylov import generalized_residuals
-from .linear.preconditioner import FastDiagonalization, fast_diagonalization, leaves_constants
+from .linear.low_order import LowOrder, Survey, surveyed
+from .linear.preconditioner import Componentwise, fast_diagonalization
 from .options import IterationOptions, SolveOptions, check_device
-from .patch_system import PatchProblem, PatchSystem, systems_of
+from .patch_system import PatchProblem, PatchSystem, operators_of, systems_of
 from .reactions import balance
 from .solution import Solution, SolveReport
 
@@ -44,7 +46,7 @@ LARGEST_VALUE = 1e150  # of a solution: the squares of larger ones overflow
 
 log = logging.getLogger(__name__)
 
-Preconditioner = FastDiagonalization | GluedPreconditioner
+Preconditioner = Componentwise | LowOrder
 TOLD = 10.0  # seconds between two lines on the iterations
 
 
@@ -91,7 +93,8 @@ class System:
     patches: tuple[PatchSystem, ...]  # of this process
     matrix: BodyMatrix  # of all patches
     unknowns: Unknowns
-    blocks: tuple[Preconditioner, ...]  # a component each
+    inverse: Preconditioner
+    is_open: bool  # whether a constant is in the kernel of A
     right: Array  # b, (c, ...): of the free coefficients
     setup: float = 0.0  # process seconds
 
@@ -174,7 +177,7 @@ class System:
 
     def precondition(self, residual: Array) -> Array:
         """Return the preconditioner times the free coefficients (c, ...)."""
-        return np.stack([block(part) for block, part in zip(self.blocks, residual, strict=True)])
+        return self.inverse(residual)
 
     def _linear(self, apply: Callable[[Array], Array]) -> LinearOperator:
         def product(x: Array) -> Array:
@@ -218,7 +221,7 @@ class System:
         steps = result.iterations + (options.start is not None)  # products made
         traffic = {kind: (count - sent.get(kind, 0)) / steps for kind, count in processes.traffic().items() if steps}
         full = self._filled(result.x)
-        if self.blocks[0].singular:
+        if self.is_open:
             mean = missing_mean(self._parts(full), processes)
             full = [part + mean for part in full]
         clock.append(time.process_time())
@@ -233,7 +236,7 @@ class System:
             doubtful.append(f"the error is not estimated: {why}; compare two refinements")
         if not has_norm:
             doubtful.append(f"the solution reaches {largest:.1e}, too large for its norms: choose other units")
-        weaknesses = [text for own in processes.shared([block.weakness for block in self.blocks]) for text in own]
+        weaknesses = processes.shared(self.inverse.weakness)
         of_map = map_notices(self.stated, options.certified, weaknesses, self._folded)
         spaces = [patch.space for patch in self.patches]
         report = SolveReport(
@@ -327,9 +330,9 @@ class System:
         if options.device != "cpu":
             from .linear.cuda import solve_on_device
 
-            operator, block = self.patches[0].matrix, self.blocks[0]
-            assert isinstance(operator, Operator) and isinstance(block, FastDiagonalization)
-            return solve_on_device(operator, block, self.right, *limits, options.device, guess)
+            operator = self.patches[0].matrix
+            assert isinstance(operator, Operator) and isinstance(self.inverse, Componentwise)
+            return solve_on_device(operator, self.inverse.blocks[0], self.right, *limits, options.device, guess)
         if self.problem.form.symmetric:
             processes = self.unknowns.processes
             system = _Told(self.product, processes.rank == 0), self.right, self.precondition
@@ -413,22 +416,48 @@ def system_of(
     matrix, loads = found.matrix, found.loads
     known = matrix.layout.joined(unknowns.completed(found.known))
     systems = systems_of([patches[number] for number in unknowns.patches], found._replace(known=known))
-    _demand_held(body, problem, systems, unknowns, is_loose)
-    blocks = preconditioners(unknowns, [system.operators for system in systems], body.interfaces)
-    if blocks[0].singular and not is_loose and isinstance(systems[0].matrix, FormOperator):
+    survey = surveyed(matrix)
+    _demand_held(body, problem, systems, unknowns, survey.free, is_loose)
+    is_open = all(unknowns.processes.shared(bool(survey.free.all())))
+    if is_open and not is_loose and isinstance(systems[0].matrix, FormOperator):
         raise ValueError(
             f"{type(problem.form).__name__} without a reaction, and with Neumann data on all faces, does not "
             "determine the solution: give a value, or an exchange, on a face or a region"
         )
     right = unknowns.collect(loads - matrix.apply(known))
-    right = balanced(right, unknowns) if blocks[0].singular and not is_loose else right
-    return System(body, problem, patches, systems, matrix, unknowns, blocks, right)
+    right = balanced(right, unknowns) if is_open and not is_loose else right
+    inverse = preconditioner(body, unknowns, matrix, survey, is_loose)
+    return System(body, problem, patches, systems, matrix, unknowns, inverse, is_open, right)
+
+
+def preconditioner(
+    body: Body, unknowns: Unknowns, matrix: BodyMatrix, survey: Survey, is_loose: bool
+) -> Preconditioner:
+    """Return the preconditioner of a matrix: fast diagonalization of one patch where it serves, otherwise low order.
+
+    It serves one component, and several where all faces are held: components and faces then couple little.
+    """
+    if isinstance(unknowns, Window):
+        space, components = unknowns.space, len(survey.diagonal[0])
+        if components == 1 or len(space.dirichlet) == len(FACE_NAMES) or space.whole is not space:
+            return Componentwise(tuple(map(fast_diagonalization, operators_of(matrix, components)[0])))
+        unknowns = Glued.of([space], ())
+    assert isinstance(unknowns, Glued)
+    return LowOrder.of(body, unknowns, matrix, survey, is_loose)
 
 
 def _demand_held(
-    body: Body, problem: BoundaryValueProblem, systems: Sequence[PatchSystem], unknowns: Unknowns, is_loose: bool
+    body: Body,
+    problem: BoundaryValueProblem,
+    systems: Sequence[PatchSystem],
+    unknowns: Unknowns,
+    free: Mask,
+    is_loose: bool,
 ) -> None:
-    """Raise ValueError where a region has no area, and where a part of a body that is not loose is free to move."""
+    """Raise ValueError where a region has no area, and where a part of a body that is not loose is free to move.
+
+    free: which of the patches leave a constant free.
+    """
     processes, here = unknowns.processes, dict(zip(unknowns.patches, systems, strict=True))
     demand_area(problem, [face for system in systems for face in system.weak], processes, body.patches)
     if is_loose:
@@ -444,19 +473,22 @@ def _demand_held(
         except ValueError as error:
             raise ValueError(f"{named}: {error}" if len(parts) > 1 else str(error)) from None
         if len(parts) > 1:
-            demand_fixed(numbers, [operator for system in part for operator in system.operators], processes)
+            demand_fixed(numbers, free[np.isin(unknowns.patches, numbers)], processes)
 
 
-def demand_fixed(part: Sequence[int], operators: Sequence[Operator], processes: Processes) -> None:
-    """Raise ValueError where the operators of a part of a body, patches by their numbers, leave a constant free."""
-    if all(processes.shared(all(map(leaves_constants, operators)))):
+def demand_fixed(part: Sequence[int], free: Mask, processes: Processes) -> None:
+    """Raise ValueError where a part of a body, patches by their numbers, leaves a constant free.
+
+    free: which of its patches on this process do.
+    """
+    if all(processes.shared(bool(free.all()))):
         named = ", ".join(f"p{number}" for number in part)
         raise ValueError(f"nothing fixes the solution on {named}, a part of its own: give it a value, or glue it")
 
 
 def preconditioners(
     unknowns: Unknowns, operators: Sequence[Sequence[Operator]], interfaces: Sequence[Interface]
-) -> tuple[Preconditioner, ...]:
+) -> tuple[Any, ...]:
     """Return the preconditioner of each component from the scalar operators of each patch."""
     if not isinstance(unknowns, Glued):
         return tuple(map(fast_diagonalization, operators[0]))

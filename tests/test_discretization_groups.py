@@ -10,6 +10,7 @@ from solve.discretization.operator import assemble, diagonals
 from solve.discretization.space import trial_space
 from solve.linear.preconditioner import fast_diagonalization
 from solve.linear.stacked import diagonalizations
+from solve.patch_system import operators_of
 
 
 def row_of(counts, degree=2):
@@ -74,13 +75,19 @@ def test_a_stack_is_assembled_as_its_patches_are(problem):
     system = iga_nn.discretize(body, problem)
     assert len(system.matrix.stacks) == 1 and not system.matrix.alone
     placed = problem.on(body).on_patches(body)
-    for patch, own in zip(system.patches, placed, strict=True):
+    every = operators_of(system.matrix, problem.form.components)
+    for patch, own, blocks in zip(system.patches, placed, every, strict=True):
         how = {"rule": patch.matrix.rule, "component": patch.matrix.component if own.form.components == 1 else None}
         matrix, load = assemble(patch.volume, patch.space, own.form, own.source_at, **how)
         name = "factors" if own.form.components == 1 else "rows"
         assert np.allclose(getattr(matrix, name), getattr(patch.matrix, name), rtol=1e-12, atol=1e-15)
         assert np.allclose(load, patch.loads, rtol=1e-12, atol=1e-15)
-        assert np.allclose(patch.operators[-1].diagonal(), matrix_diagonal(patch, own), rtol=1e-12, atol=1e-15)
+        assert np.allclose(
+            blocks[-1].diagonal(),
+            matrix_diagonal(patch, own),
+            rtol=1e-12,
+            atol=1e-15,
+        )
 
 
 def matrix_diagonal(patch, problem):
@@ -94,7 +101,7 @@ def test_stacked_diagonalizations_are_those_of_single_patches():
     robin = {"p0_v1": ("2", "0"), "p3_v1": ("1", "0")}
     problem = iga_nn.Poisson(source="1", kappa="1+x", robin=robin, neumann=free)
     system = iga_nn.discretize(row_of((3, 3, 3, 3)), problem, refine=1)
-    operators = [patch.operators[0] for patch in system.patches]
+    operators = [patch.matrix for patch in system.patches]
     ((numbers, stack),), alone = diagonalizations(operators, diagonals(operators))
     assert not alone and numbers.tolist() == [0, 1, 2, 3]
     residuals = np.random.default_rng(0).standard_normal((4, *operators[0].space.shape))

@@ -64,12 +64,13 @@ def price_of(unknowns: Unknowns, matrices: Sequence[MatrixFree], components: int
     return made / 2 + components * int(np.prod(unknowns.shape)) / PER_UNKNOWN
 
 
-def factorized(matrix: csc_array, points: Array) -> Callable[[Array], Array] | None:
+def factorized(matrix: csc_array, points: Array, least: float = 0.0) -> Callable[[Array], Array] | None:
     """Return the function that solves with a symmetric positive matrix (N, N) for columns (N, m).
 
-    points: (n, 3), where N = c n: unknown i + k n, of component k, belongs to point i; near points are neighbours. None
-    is returned for a matrix that is not positive even with the largest of SHARES.
+    points: (n, 3), where N = c n: unknown i + k n, of component k, belongs to point i; near points are neighbours.
+    least: the least share of the diagonal that is added. None is returned for a matrix that is not positive even with
+    the largest of SHARES.
     """
     tree = Dissection.of(touching(matrix, len(points)), points)
-    shifted = ((matrix + diags_array(share * matrix.diagonal())).tocsc() for share in SHARES)
+    shifted = ((matrix + diags_array(share * matrix.diagonal())).tocsc() for share in SHARES if share >= least)
     return next(filter(None, (cholesky(one, tree) for one in shifted)), None)

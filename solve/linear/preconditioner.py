@@ -140,6 +140,22 @@ def fast_diagonalization(operator: Operator) -> FastDiagonalization:
         return whole if whole.local is not None and _is_usable(whole) else replace(found, weakness=NO_FACTOR)
 
 
+@dataclass(frozen=True, eq=False)
+class Componentwise:
+    """Apply the preconditioners of the components of a law on one patch, (c, n_u, n_v, n_w)."""
+
+    blocks: tuple[FastDiagonalization, ...]
+
+    def __call__(self, residual: Array) -> Array:
+        """Return the preconditioned residual."""
+        return np.stack([block(part) for block, part in zip(self.blocks, residual, strict=True)])
+
+    @property
+    def weakness(self) -> str:
+        """Return the first part that a block had to leave out."""
+        return next((block.weakness for block in self.blocks if block.weakness), "")
+
+
 def leaves_constants(operator: Operator) -> bool:
     """Return whether constants are in an operator's kernel: no Dirichlet face, no reaction, no term on faces."""
     stiff = (face.stiffness(operator.component) for face in operator.faces.values())
