@@ -5,7 +5,9 @@ import pytest
 
 import iga_nn
 from solve.discretization.error_norms import Compared, error_norms
+from solve.discretization.group_kernels import multiply_patches
 from solve.discretization.groups import Layout
+from solve.discretization.lane_kernels import multiply_small
 from solve.discretization.operator import assemble, diagonals
 from solve.discretization.space import trial_space
 from solve.linear.preconditioner import fast_diagonalization
@@ -159,3 +161,17 @@ def test_the_matrix_of_terms_on_faces_is_that_of_their_products(problem):
             face.add_product(coefficients, total)
     assert np.abs(expected.flat).max() > 0.01
     assert found.flat == pytest.approx(expected.flat, abs=1e-12 * np.abs(expected.flat).max())
+
+
+@pytest.mark.parametrize("count", [2, 3, 11])
+def test_lanes_multiply_as_rows_of_points_do(count):
+    """One block of lanes, a full one with the start of another, and too few patches for lanes."""
+    system = iga_nn.discretize(row_of((3,) * count), iga_nn.Poisson(source="1", kappa="1+x*y", reaction="z"))
+    (matrix,) = system.matrix.stacks
+    coefficients = np.random.default_rng(0).standard_normal((count, 2, *matrix.stack.space.shape))
+    results = np.zeros_like(coefficients), np.zeros_like(coefficients)
+    stack, numbers = matrix.stack, np.arange(count)
+    for kernel, result in zip((multiply_small, multiply_patches), results, strict=True):
+        where = matrix.places, numbers, np.arange(stack.shape[0]), stack.kinds, stack.tables, matrix.factors
+        kernel(coefficients, *where, result)
+    assert results[0] == pytest.approx(results[1], rel=1e-12, abs=1e-13)

@@ -3,6 +3,7 @@
 Their factors (q_u, .., q_w, q_v) are parts of an array (k, q_u, .., q_w, q_v), which compiled kernels pass.
 """
 
+import math
 from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -15,7 +16,7 @@ from parameterize.arrays import Array, IntArray
 from parameterize.spline.volume import BSplineVolume
 
 from ..forms.form import Form
-from . import group_kernels
+from . import group_kernels, lane_kernels
 from .groups import Layout, OnPatches
 from .operator import Source, assemble_stack, multiply_law
 from .quadrature import GaussRule
@@ -65,7 +66,9 @@ class StackMatrix:
                 multiply_law(stack, piece, self.places, self.forms[piece[0][0]], coefficients, result)
                 return
             where = self.places, *piece, stack.kinds, stack.tables, self.factors
-            if self.laws is None:
+            if self.laws is None and stack.is_small and math.prod(stack.plane_shape) <= lane_kernels.MOST:
+                lane_kernels.multiply_small(coefficients, *where, result)
+            elif self.laws is None:
                 group_kernels.multiply_patches(coefficients, *where, result)
             else:
                 group_kernels.multiply_laws(coefficients, *where, self.laws, result)

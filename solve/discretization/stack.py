@@ -54,7 +54,7 @@ def stacks_of(patches: Sequence[Stacked], threads: int) -> Iterator[tuple[list[i
         of_map = volume.degrees, volume.shape, volume.weights is None
         found[of_map, space.degrees, space.shape, rule.shape, shape][same].append(number)
     for runs in found.values():
-        numbers = [number for own in runs.values() for number in own]
+        numbers = [number for own in runs.values() for number in sorted(own, key=lambda i: id(patches[i].rule))]
         ends = np.cumsum([0, *map(len, runs.values())]).tolist()
         volumes, spaces, rules, _, _ = zip(*(patches[number] for number in numbers), strict=True)
         yield numbers, Stack(spaces, rules, threads, volumes, ends)
@@ -133,10 +133,15 @@ class Stack:
         firsts = np.unique(self.kinds, return_index=True)[1]
         return np.stack([self.rules[i].plane_weights(q) for i in firsts])
 
+    @property
+    def is_small(self) -> bool:
+        """Return whether patches are worked on as a whole."""
+        return len(self) > 1 and math.prod(self.shape) < LARGE
+
     def on_pieces(self, task: Callable[[Piece], None]) -> None:
         """Run a task on all patches and points of u. It may add to the coefficients of the functions at its points."""
         every = np.arange(self.shape[0])
-        if len(self) > 1 and math.prod(self.shape) < LARGE:
+        if self.is_small:
             in_parallel(task, [(own, every) for own in self._patches()], self.threads)
             return
         first, degree = self.tables[0][0], self.space.degrees[0]
