@@ -158,7 +158,7 @@ def test_what_cannot_hold_a_body_is_refused_in_one_line(given, says, coarse_regi
 def test_conditions_that_agree_may_overlap_on_a_whole_face():
     held = {"u0": 0, "x < 0.5": (0, None, "x")}
     law = Elasticity(fix=held, conditions=[Fix("u0 or u0")], load={"nx > 0.5": (0, 0, 1)}, spring={"z < 0.5": 1.0})
-    assert discretize(BAR, law).space.dirichlet == ("u0",)
+    assert discretize(BAR, law).patches[0].space.dirichlet == ("u0",)
 
 
 def test_a_whole_face_of_one_patch_and_a_region_that_contradict_are_refused():

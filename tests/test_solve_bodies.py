@@ -7,6 +7,9 @@ from example_files import load
 
 import iga_nn
 from parameterize.spline.bspline import with_full_knots
+from solve.assembly import assemble_body_data
+from solve.options import SolveOptions
+from solve.solver import prepared
 
 NOTHING = ("0", "0", "0")
 FREE = ("u1", "v0", "v1", "w0", "w1")
@@ -41,6 +44,30 @@ def test_heat_in_two_patches_is_that_in_one(scheme):
     for field, of_patches in zip(one.fields, several.fields, strict=True):
         demand_same(field, of_patches, 1e-9)
     assert several.fields[-1].probe([[0.5, 0.5, 0.5]])[0] == pytest.approx(one.fields[-1].probe([[0.5, 0.5, 0.5]])[0])
+
+
+def on_regions(time):
+    """Data of time on regions that no patch ends: an exchange whose surroundings warm up, a flux, and values."""
+    held, heated = iga_nn.Value("u1", f"sin({time})*y"), iga_nn.Flux("v0 and x > 0.5", f"1+{time}*x")
+    around = iga_nn.Exchange("z > 0.999 and x < 1.7", 2.0, f"{time}")
+    return iga_nn.Problem(iga_nn.Poisson(source="0").form, source=f"x*{time}", conditions=[held, heated, around])
+
+
+def test_data_of_time_on_regions_of_two_patches_are_those_of_one():
+    how = {"dt": 0.1, "steps": 4, "tolerance": 1e-13}
+    one, several = (iga_nn.march(body, on_regions, "1+x", **how).fields[-1] for body in bent_rod())
+    demand_same(one, several, 1e-10)
+    assert not np.allclose(one.coefficients[..., -1], one.coefficients[..., 0], atol=0.1)
+
+
+def test_renewed_data_on_regions_are_those_that_are_assembled_anew():
+    _, rod = bent_rod()
+    options = SolveOptions()
+    early, late = (prepared(rod, on_regions(time), options)[1] for time in (0.3, 0.7))
+    renewed, anew = assemble_body_data(early, options).renewed(late), assemble_body_data(late, options)
+    for name in ("loads", "known"):
+        found, wanted = getattr(renewed, name).flat, getattr(anew, name).flat
+        assert np.abs(wanted).max() > 0.0 and found == pytest.approx(wanted, abs=1e-14)
 
 
 def test_a_march_goes_on_from_a_field_on_several_patches():
@@ -92,6 +119,13 @@ def test_a_nonlinear_law_on_two_patches_has_the_solution_of_one():
     one, several = (iga_nn.newton(body, problem, tolerance=1e-13) for body in bent_rod())
     demand_same(one, several, 1e-10)
     assert one.report.dofs == several.report.dofs and one.report.iterations == several.report.iterations
+
+
+def test_a_nonlinear_law_with_data_on_regions_of_two_patches_has_the_solution_of_one():
+    conditions = [iga_nn.Exchange("z > 0.999 and x < 1.7", 2.0, "y"), iga_nn.Flux("v0 and x > 0.5", "1+x")]
+    problem = iga_nn.Problem(Warm(), source="5*x", conditions=conditions)
+    one, several = (iga_nn.newton(body, problem, tolerance=1e-13) for body in bent_rod())
+    demand_same(one, several, 1e-10)
 
 
 def test_a_rod_of_two_patches_bends_far_as_one():
