@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from parameterize.arrays import Array, Knots
 from parameterize.display import Brief
-from parameterize.files import array_names, save_arrays
+from parameterize.files import array_names, load_arrays, save_arrays
 from parameterize.quality.distances import nearest_on_boundary
 from parameterize.spline.archive import BASIS, load_patch_arrays, named_arrays
 from parameterize.spline.body import Body, BodyLike, all_control_points, as_body
@@ -27,12 +27,13 @@ class Points(np.ndarray[Any, Any]):
 
     rows: the parameters of a tensor grid, an array a direction; None where they are unknown, as for a part of the
     array. order: the directions along which the axes (...) run. places: the parameters (m, 3) of points (3, m) without
-    a grid.
+    a grid. pressure: the pressure (...) there of a solution that has one, as a law's quantities receive it.
     """
 
     rows: Sequence[ArrayLike] | None = None
     order: tuple[int, ...] = (0, 1, 2)
     places: Array | None = None
+    pressure: Array | None = None
 
     @classmethod
     def of(cls, x: Array, rows: Sequence[ArrayLike], order: tuple[int, ...] = (0, 1, 2)) -> Self:
@@ -116,6 +117,8 @@ class SplineField(Brief, FieldOnBody):
         The coefficients; (m_u, m_v, m_w, c) with c components.
     geometry : BSplineVolume, optional
         The volume on which the field was found; None for a function on any volume.
+    pressure : (m_u, m_v, m_w) array, optional
+        The coefficients of the pressure of a nearly incompressible body, with the displacement as the field.
 
     Raises
     ------
@@ -136,11 +139,16 @@ class SplineField(Brief, FieldOnBody):
     knots: Knots
     coefficients: Array
     geometry: BSplineVolume | None = None
+    pressure: Array | None = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
         shape = np.shape(self.coefficients)
         if len(self.degrees) != 3 or len(self.knots) != 3 or len(shape) not in (3, 4):
             raise ValueError("a field has three degrees, three knot vectors, coefficients (m_u, m_v, m_w) or (.., c)")
+        if self.pressure is not None and np.shape(self.pressure) != shape[:3]:
+            raise ValueError(
+                f"pressure must have the shape {shape[:3]} of the coefficients, got {np.shape(self.pressure)}"
+            )
         object.__setattr__(self, "knots", checked_knots(self.degrees, self.knots, shape[:3], "coefficients"))
 
     def __call__(self, points: ArrayLike) -> Array:
@@ -183,9 +191,15 @@ class SplineField(Brief, FieldOnBody):
         values = values.transpose(0, *(1 + axis for axis in (*x.order, *single))).reshape(-1, *x.shape[1:])
         return values if self.coefficients.ndim == 4 else values[0]
 
+    @property
+    def columns(self) -> Array:
+        """Return the coefficients (m_u, m_v, m_w, c) of all components, and of a pressure as one more."""
+        vectors = self.coefficients.reshape(*self.coefficients.shape[:3], -1)
+        return vectors if self.pressure is None else np.concatenate([vectors, self.pressure[..., None]], axis=-1)
+
     def save(self, path: str | Path) -> None:
-        """Write solution.npz (degrees, knots_u, knots_v, knots_w, coefficients) atomically."""
-        save_spline(path, self.degrees, self.knots, coefficients=self.coefficients)
+        """Write solution.npz (degrees, knots_u, knots_v, knots_w, coefficients, pressure if any) atomically."""
+        save_spline(path, self.degrees, self.knots, coefficients=self.coefficients, **_pressure_of(self))
 
     @staticmethod
     def load(path: str | Path) -> "SplineField":
@@ -194,7 +208,8 @@ class SplineField(Brief, FieldOnBody):
         Raises FileNotFoundError, or a ValueError that names the defect of the file.
         """
         degrees, knots, coefficients = load_spline(path, "coefficients")
-        return _checked(str(path), np.array(degrees), knots, coefficients)
+        pressure = load_arrays(path, (), ("pressure",)).get("pressure")
+        return _checked(str(path), np.array(degrees), knots, coefficients, pressure)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -282,7 +297,7 @@ class BodyField(Brief, FieldOnBody):
         coefficients: those of each patch, by default its own.
         """
         parts = [
-            dict(zip(ARRAYS, (np.array(patch.degrees), *patch.knots, values), strict=True))
+            dict(zip(ARRAYS, (np.array(patch.degrees), *patch.knots, values), strict=True)) | _pressure_of(patch)
             for patch, values in zip(self.patches, coefficients or self._coefficients, strict=True)
         ]
         return parts[0] if self.is_single else named_arrays(parts)
@@ -304,19 +319,27 @@ class BodyField(Brief, FieldOnBody):
         if not any(name.endswith("_degrees") for name in array_names(path)):
             return BodyField((SplineField.load(path),))
         patches = []
-        for number, arrays in enumerate(load_patch_arrays(path, ("coefficients",))):
+        for number, arrays in enumerate(load_patch_arrays(path, ("coefficients",), ("pressure",))):
             degrees, *knots, coefficients = (arrays[name] for name in ARRAYS)
-            patches.append(_checked(f"{path}: patch {number}", degrees, knots, coefficients))
+            patches.append(_checked(f"{path}: patch {number}", degrees, knots, coefficients, arrays.get("pressure")))
         return BodyField(tuple(patches))
 
 
-def _checked(place: str, degrees: Array, knots: Sequence[Array], coefficients: Array) -> SplineField:
+def _pressure_of(field: SplineField) -> dict[str, Array]:
+    """Return the array of a field's pressure by its name in a file; none without a pressure."""
+    return {} if field.pressure is None else {"pressure": field.pressure}
+
+
+def _checked(
+    place: str, degrees: Array, knots: Sequence[Array], coefficients: Array, pressure: Array | None
+) -> SplineField:
     """Return the field of a file. Raises ValueError, which begins with the place in the file."""
-    if coefficients.dtype.kind != "f" or not np.all(np.isfinite(coefficients)):
-        raise ValueError(f"{place}: coefficients must be finite numbers")
+    for name, values in (("coefficients", coefficients), ("pressure", pressure)):
+        if values is not None and (values.dtype.kind != "f" or not np.all(np.isfinite(values))):
+            raise ValueError(f"{place}: {name} must be finite numbers")
     try:
         (p_u, p_v, p_w), (k_u, k_v, k_w) = degrees.tolist(), knots
-        return SplineField((p_u, p_v, p_w), (k_u, k_v, k_w), coefficients)
+        return SplineField((p_u, p_v, p_w), (k_u, k_v, k_w), coefficients, pressure=pressure)
     except (TypeError, ValueError) as error:
         raise ValueError(f"{place}: {error}") from None
 

@@ -2,7 +2,7 @@
 
 from collections import defaultdict
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from numbers import Real
 from typing import Any
 
@@ -30,19 +30,22 @@ class FieldGroup:
         Of k splines each; functions of one component have one column.
     problem : BoundaryValueProblem or None
         That of the first patch, whose law is the law of all; None where it is unknown.
+    has_pressure : bool
+        Whether the last column is a pressure.
     """
 
     numbers: IntArray
     maps: SplineStack
     values: SplineStack
     problem: BoundaryValueProblem | None
+    has_pressure: bool = False
 
     def __len__(self) -> int:
         return len(self.numbers)
 
     def take(self, rows: IntArray | slice) -> "FieldGroup":
         """Return some of the patches. rows: their places in the group."""
-        return FieldGroup(self.numbers[rows], self.maps.take(rows), self.values.take(rows), self.problem)
+        return replace(self, numbers=self.numbers[rows], maps=self.maps.take(rows), values=self.values.take(rows))
 
     def points_on(self, u: Array, v: Array, w: Array) -> Points:
         """Return the points (3, k, len(u), len(v), len(w)) of the patches on a tensor grid of parameters."""
@@ -59,17 +62,15 @@ def _divided(maps: PatchGroup, patches: Sequence[SplineField]) -> list[FieldGrou
     members: dict[Any, list[int]] = defaultdict(list)
     for row, number in enumerate(maps.numbers.tolist()):
         own = patches[number]
-        members[own.degrees, *(knots.tobytes() for knots in own.knots), *_law_of(own)].append(row)
+        members[own.degrees, own.pressure is None, *(knots.tobytes() for knots in own.knots), *_law_of(own)].append(row)
     stack = SplineStack.of_maps(maps)
     return [_group(maps.numbers[rows], stack.take(np.array(rows)), patches) for rows in members.values()]
 
 
 def _group(numbers: IntArray, maps: SplineStack, patches: Sequence[SplineField]) -> FieldGroup:
     own = [patches[number] for number in numbers.tolist()]
-    coefficients = np.stack([patch.coefficients for patch in own])
-    coefficients = coefficients.reshape(*coefficients.shape[:4], -1)
-    values = SplineStack(own[0].degrees, own[0].knots, coefficients)
-    return FieldGroup(numbers, maps, values, getattr(own[0], "problem", None))
+    values = SplineStack(own[0].degrees, own[0].knots, np.stack([patch.columns for patch in own]))
+    return FieldGroup(numbers, maps, values, getattr(own[0], "problem", None), own[0].pressure is not None)
 
 
 def _law_of(field: SplineField) -> tuple[Any, ...]:

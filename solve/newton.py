@@ -27,6 +27,7 @@ from .field import FieldOnBody
 from .forms.boundary_value_problem import BoundaryValueProblem
 from .forms.form import Form
 from .forms.problem import Problem
+from .forms.under_law import UnderLaw
 from .linear.krylov import generalized_residuals
 from .linear.preconditioner import leaves_constants
 from .options import SolveOptions
@@ -162,7 +163,7 @@ class _Balance:
 
         linear_iterations: the largest number of iterations of the linear solver in a Newton step.
         """
-        problems: list[Any] = [_Loads(patch.problem) for patch in patches]
+        problems: list[Any] = [UnderLaw(patch.problem, _Simple(patch.problem.form.components)) for patch in patches]
         simple = [OnePatch(own.volume, one, own.space) for own, one in zip(patches, problems, strict=True)]
         matrix, loads, known = assemble_body_data(simple, options)
         on_regions = [face for own in matrix.parts for face in own.faces.values() if isinstance(face, WeakFace)]
@@ -260,19 +261,11 @@ def _largest(values: OnPatches) -> float:
     return float(np.abs(values.flat).max(initial=0.0))
 
 
-class _Loads:
-    """State a problem under a simple law, of which only the loads and the data on faces are assembled."""
-
-    def __init__(self, problem: BoundaryValueProblem) -> None:
-        self.problem, self.form = problem, _Simple()
-        self.form.components = problem.form.components
-
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self.problem, name)
-
-
 class _Simple(Form):
-    """Define the law of Laplace's equation."""
+    """Define the law of Laplace's equation, of which only loads and data on faces are assembled."""
+
+    def __init__(self, components: int) -> None:
+        self.components = components
 
     def flux(self, u: Any, grad: Any, x: Any) -> Any:
         """Return the gradient."""

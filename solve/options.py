@@ -13,6 +13,7 @@ from .forms.boundary_value_problem import BoundaryValueProblem
 from .forms.poisson import Poisson
 
 DEVICES = ("cpu", "cuda")
+FORMULATIONS = ("mixed", "displacement")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -57,9 +58,12 @@ class SolveOptions(IterationOptions):
     threads: int | None = None
     quadrature: str = "spline"
     comm: Any = None
+    formulation: str | None = None
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        if self.formulation not in (None, *FORMULATIONS):
+            raise ValueError(f"formulation must be one of {', '.join(FORMULATIONS)}, got {self.formulation!r:.80}")
         if self.threads is not None and self.threads < 1:
             raise ValueError(f"threads must be at least 1, got {self.threads}; leave it out for {default_threads()}")
 

@@ -100,7 +100,7 @@ def at_points(field: SplineField, form: Form, what: str | Quantity, points: Arra
 def _values(field: SplineField, quantity: Quantity, where: Array) -> Array:
     """Return a quantity (..., m) at parameters (m, 3)."""
     volume = volume_of(field)
-    spline = (field.degrees, field.knots, _vectors(field), where)
+    spline = (field.degrees, field.knots, field.columns, where)
     slopes = np.stack([evaluate_at(*spline, order) for order in UNITS], axis=-1)  # (m, c, 3)
     return _evaluated(
         quantity,
@@ -108,6 +108,7 @@ def _values(field: SplineField, quantity: Quantity, where: Array) -> Array:
         np.moveaxis(slopes, 0, -1),
         np.moveaxis(volume.jacobian(where), 0, -1),
         Points.at(np.ascontiguousarray(volume(where).T), where),
+        field.pressure is not None,
     )
 
 
@@ -134,20 +135,19 @@ def group_values(group: FieldGroup, quantity: Quantity, u: Array, v: Array, w: A
         np.moveaxis(slopes, (-2, -1), (0, 1)),
         np.moveaxis(jacobian, (-2, -1), (0, 1)),
         group.points_on(u, v, w),
+        group.has_pressure,
     )
 
 
-def _vectors(field: SplineField) -> Array:
-    """Return the coefficients as (m_u, m_v, m_w, c), with c = 1 for one component."""
-    return field.coefficients[..., None] if field.coefficients.ndim == 3 else field.coefficients
-
-
-def _evaluated(quantity: Quantity, u: Array, slopes: Array, jacobian: Array, x: Points) -> Array:
+def _evaluated(quantity: Quantity, u: Array, slopes: Array, jacobian: Array, x: Points, has_pressure: bool) -> Array:
     """Return a quantity (..., shape) from u (c, shape), slopes (c, 3, shape) in the parameters, and J (3, 3, shape).
 
-    Raises ValueError for a function that fails or does not return numbers of the points' shape.
+    has_pressure: whether the last component is a pressure, which the points x take to the quantity. Raises ValueError
+    for a function that fails or does not return numbers of the points' shape.
     """
     inverse = np.moveaxis(np.linalg.inv(np.moveaxis(jacobian, (0, 1), (-2, -1))), (-2, -1), (0, 1))
+    if has_pressure:
+        u, slopes, x.pressure = u[:-1], slopes[:-1], u[-1]
     grad = np.einsum("cb...,ba...->ca...", slopes, inverse)
     try:
         found = np.asarray(quantity(u, grad, x), dtype=np.float64)
@@ -310,7 +310,7 @@ def _at(group: FieldGroup, quantity: Quantity, owners: IntArray, where: Array) -
     u, slopes = group.values.at(owners, where)
     x, jacobian = group.maps.at(owners, where)
     u, slopes, jacobian = (np.moveaxis(part, 0, -1) for part in (u, slopes, jacobian))
-    return _evaluated(quantity, u, slopes, jacobian, Points.at(np.ascontiguousarray(x.T), where))
+    return _evaluated(quantity, u, slopes, jacobian, Points.at(np.ascontiguousarray(x.T), where), group.has_pressure)
 
 
 def _peak(groups: Sequence[FieldGroup], best: _Candidates, row: int) -> tuple[float, Place, Place]:

@@ -73,6 +73,8 @@ class SolveReport:
         ("halo"), and in the preconditioner ("transposition", "substitution").
     balance : Balance or None
         The loads on the body and the reactions of its supports.
+    formulation : str
+        "mixed" for displacement and pressure of a nearly incompressible body, otherwise "displacement".
 
     Examples
     --------
@@ -97,6 +99,7 @@ class SolveReport:
     residuals: tuple[float, ...] = field(default=(), repr=False)
     traffic: Mapping[str, float] = field(default_factory=dict)
     balance: Balance | None = None
+    formulation: str = "displacement"
 
     l2 = _known("errors", "l2")
     l2_relative = _known("errors", "l2_relative")
@@ -110,6 +113,7 @@ class SolveReport:
         names = ("elements", "dofs", "h", *NORMS, "iterations", "converged", "residual", "meaningful", "seconds")
         found = {name: value for name in names if (value := getattr(self, name)) is not None}
         found |= self.balance.as_dict() if self.balance and self.balance.is_told else {}
+        found |= {} if self.formulation == "displacement" else {"formulation": self.formulation}
         return found | ({"traffic": dict(self.traffic)} if self.traffic else {})
 
     def __str__(self) -> str:
@@ -147,7 +151,7 @@ class PatchSolution(SplineField):
     @property
     def field(self) -> SplineField:
         """Return the spline alone, as a datum for another problem on the same volume."""
-        return SplineField(self.degrees, self.knots, self.coefficients, self.geometry)
+        return SplineField(self.degrees, self.knots, self.coefficients, self.geometry, self.pressure)
 
     def quantity(self, what: str | Quantity, points: ArrayLike) -> Array:
         """Return a quantity (m, ...) at parameters (m, 3); `what` as in `Solution.quantity`."""
@@ -213,7 +217,8 @@ class Solution(BodyField, Shown):
         body = field.on_body
         parts = zip(field.patches, body, problems, strict=True)
         patches = (
-            PatchSolution(one.degrees, one.knots, one.coefficients, volume, problem=own) for one, volume, own in parts
+            PatchSolution(one.degrees, one.knots, one.coefficients, volume, one.pressure, problem=own)
+            for one, volume, own in parts
         )
         return cls(tuple(patches), body, report, problem)
 

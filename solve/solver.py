@@ -24,6 +24,7 @@ from .forms.boundary_value_problem import BoundaryValueProblem
 from .forms.elasticity import Elasticity
 from .forms.poisson import Poisson
 from .forms.problem import Problem
+from .mixed import build_mixed, is_mixed
 from .options import SolveOptions, check_device
 from .patch_system import PatchProblem
 from .solution import Solution
@@ -56,6 +57,9 @@ def solve_problem(body: BodyLike, problem: Poisson | Elasticity | Problem, **how
         "gauss", `degree` Gauss points a span; "gauss+1", one point more. Errors always use degree + 2 points a span.
     comm : mpi4py.MPI.Comm, optional
         Communicator whose processes share the work, by default with one thread each; each returns the whole solution.
+    formulation : str, optional
+        "mixed" solves for the displacement and the pressure of an elastic body, "displacement" for the former alone. By
+        default "mixed" where Poisson's ratio exceeds 0.45, the degree is at least 2, and one process does the work.
     tolerance : float
         Tolerance of the residual, relative to the right-hand side; 1e-10 by default.
     max_iterations : int
@@ -116,12 +120,13 @@ def discretize(
     threads: int | None = None,
     quadrature: str = SolveOptions.quadrature,
     comm: Any = None,
+    formulation: str | None = None,
 ) -> System:
     """Return the linear system of a problem, for a loop of the user's own.
 
     Parameters
     ----------
-    body, problem, refine, degree, threads, quadrature, comm
+    body, problem, refine, degree, threads, quadrature, comm, formulation
         As in `iga_nn.solve`; the errors are the same, too.
 
     Returns
@@ -136,7 +141,9 @@ def discretize(
     >>> system.operator.shape, system.load.shape
     ((125, 125), (125,))
     """
-    options = SolveOptions(refine=refine, degree=degree, threads=threads, quadrature=quadrature, comm=comm)
+    options = SolveOptions(
+        refine=refine, degree=degree, threads=threads, quadrature=quadrature, comm=comm, formulation=formulation
+    )
     return discretized(body, problem, options)
 
 
@@ -146,6 +153,8 @@ def discretized(body: BodyLike, problem: BoundaryValueProblem, options: SolveOpt
     placed, patches = prepared(glued, problem, options)
     if not is_loose:
         problem.demand_held()
+        if is_mixed(problem, patches, options):
+            return build_mixed(glued, placed, patches, options)
     return build(glued, placed, patches, options, is_loose=is_loose)
 
 

@@ -5,7 +5,7 @@ import logging
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from scipy.sparse.linalg import LinearOperator
@@ -39,7 +39,7 @@ from .linear.low_order import LowOrder, Survey, surveyed
 from .linear.preconditioner import Componentwise, fast_diagonalization
 from .options import IterationOptions, SolveOptions, check_device
 from .patch_system import PatchProblem, PatchSystem, operators_of, systems_of
-from .reactions import balance
+from .reactions import Balance, balance
 from .solution import Solution, SolveReport
 
 LARGEST_VALUE = 1e150  # of a solution: the squares of larger ones overflow
@@ -97,6 +97,8 @@ class System:
     is_open: bool  # whether a constant is in the kernel of A
     right: Array  # b, (c, ...): of the free coefficients
     setup: float = 0.0  # process seconds
+
+    formulation: ClassVar[str] = "displacement"  # of the unknowns
 
     @property
     def operator(self) -> LinearOperator:
@@ -212,7 +214,7 @@ class System:
 
     def _solve(self, options: IterationOptions) -> Solution:
         problem, processes = self.problem, self.unknowns.processes
-        dofs = len(self.right) * self.unknowns.count
+        dofs = problem.form.components * self.unknowns.count
         clock, sent = [time.process_time()], processes.traffic()
         result = self._iterate(options)
         failed = failure(self.stated, result, problem.form.caveat)
@@ -253,7 +255,8 @@ class System:
             meaningful=meaningful and has_norm,
             residuals=result.residuals,
             traffic=traffic,
-            balance=balance(problem, self.patches, self.unknowns, full, self.matrix.apply(full)) if has_norm else None,
+            balance=self._balance(full) if has_norm else None,
+            formulation=self.formulation,
         )
         problems = [patch.problem for patch in self.stated]
         return Solution.of(self._field(full), problems, report, problem)
@@ -263,6 +266,10 @@ class System:
         """Return a line on each patch, of all processes, at whose points det J has the wrong sign."""
         own = [line for patch in self.patches for line in folded_notices(patch)]
         return list(dict.fromkeys(line for lines in self.unknowns.processes.shared(own) for line in lines))
+
+    def _balance(self, full: Sequence[Array]) -> Balance:
+        """Return the balance of a solution."""
+        return balance(self.problem, self.patches, self.unknowns, full, self.matrix.apply(full))
 
     def _parts(self, full: Sequence[Array]) -> list[Compared]:
         """Return coefficients (c, n_u, n_v, n_w) of each patch with the exact values, zero where none are known."""

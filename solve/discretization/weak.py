@@ -176,6 +176,10 @@ class WeakFace:
         loose = float((self.weights - held) @ self.factor)
         return loose + (fast if self.is_whole else float(np.sqrt(fast * slow)))
 
+    def values_of(self, coefficients: Array) -> Array:
+        """Return the values (c, m) of coefficients (c, n_u, n_v, n_w)."""
+        return np.asarray((self.tables[0] @ self._layer(coefficients, self.layers[0])).T)
+
     def force(self, coefficients: Array, points: Any) -> Array:
         """Return the reaction that holds u at some of the points: the integral (c,) of P t - gamma P (u - g).
 

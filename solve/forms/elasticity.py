@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Hashable, Mapping, Sequence
+from copy import copy
 from dataclasses import KW_ONLY, dataclass, field
 from numbers import Real
 from typing import Any, ClassVar, Self
@@ -149,14 +150,19 @@ class Elasticity(LawWithData):
         return super().in_volume, self.constants
 
     def flux(self, u: Any, grad: Any, x: Any) -> Any:
-        """Return the stress sigma (3, 3, ...)."""
+        """Return the stress sigma (3, 3, ...): 2 mu eps - p I, p the pressure of the points x or -lambda div u."""
         lam, mu = self.constants
         stress = grad + np.swapaxes(grad, 0, 1)
         stress *= mu
-        pressure = lam * (grad[0, 0] + grad[1, 1] + grad[2, 2])
+        known = getattr(x, "pressure", None)
+        pull = lam * (grad[0, 0] + grad[1, 1] + grad[2, 2]) if known is None else -known
         for i in range(3):
-            stress[i, i] += pressure
+            stress[i, i] += pull
         return stress
+
+    def without_volume(self) -> Self:
+        """Return the law 2 mu eps, which a pressure completes; its data are those of this law."""
+        return copy(self)._assign(young=2.0 * self.constants[1], poisson_ratio=0.0)
 
     @property
     def caveat(self) -> str:
@@ -176,14 +182,16 @@ class Elasticity(LawWithData):
     def quantities(self) -> Mapping[str, Quantity]:
         """Return the quantities of a solution by name.
 
-        Beside those of every law these are strain and stress (3, 3, ...), von Mises' stress (...), the principal
-        stresses (3, ...), and the first and the third principal stress (...).
+        Beside those of every law these are strain and stress (3, 3, ...), von Mises' stress (...), the pressure
+        (...), which is minus a third of the stresses' sum, the principal stresses (3, ...), and the first and the third
+        principal stress (...).
         """
         return {
             **super().quantities,
             "strain": lambda u, grad, x: 0.5 * (grad + np.swapaxes(grad, 0, 1)),
             "stress": self.flux,
             "von_mises": lambda u, grad, x: von_mises(self.flux(u, grad, x)),
+            "pressure": lambda u, grad, x: -np.trace(self.flux(u, grad, x)) / 3.0,
             "principal": lambda u, grad, x: principal(self.flux(u, grad, x)),
             "first_principal": lambda u, grad, x: outer_principal(self.flux(u, grad, x))[0],
             "third_principal": lambda u, grad, x: outer_principal(self.flux(u, grad, x))[1],
