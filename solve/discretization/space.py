@@ -5,6 +5,7 @@ from collections import Counter, defaultdict
 from collections.abc import Collection, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -197,7 +198,7 @@ def trial_space(
         raise ValueError(f"degree must be a whole number, 1 or more, got {degree!r:.80}")
     if refine < 0:
         raise ValueError(f"refine must be 0 or more (each level halves every span), got {refine}")
-    elements = math.prod((len(breakpoints(knots)) - 1) << int(refine) for knots in volume.knots)
+    elements = math.prod(_spans(tuple(knots.tolist())) << int(refine) for knots in volume.knots)
     if elements > MOST_ELEMENTS:
         raise ValueError(f"refine {refine} gives {elements:.1e} elements, more than {MOST_ELEMENTS:.0e}: lower it")
     if degree is not None and not 1 <= degree <= MOST_DEGREE:
@@ -205,10 +206,24 @@ def trial_space(
             f"degree must be at least 1 and at most {MOST_DEGREE}, got {degree}; leave it out for the map's own degree"
         )
     degrees = volume.degrees if degree is None else (degree,) * 3
-    rows = list(map(same_smoothness, volume.knots, volume.degrees, degrees))
-    for _ in range(refine):
-        rows = list(map(halved, rows))
+    each = zip(volume.knots, volume.degrees, degrees, strict=True)
+    rows = [_refined(tuple(knots.tolist()), old, new, int(refine)) for knots, old, new in each]
     return TrialSpace(degrees, (rows[0], rows[1], rows[2]), dirichlet, outer)
+
+
+@lru_cache(maxsize=1024)
+def _spans(knots: tuple[float, ...]) -> int:
+    """Return the number of spans of a knot vector; patches share few of these."""
+    return len(breakpoints(np.array(knots))) - 1
+
+
+@lru_cache(maxsize=1024)
+def _refined(knots: tuple[float, ...], old: int, new: int, refine: int) -> Array:
+    """Return the knot vector of degree `new` with every span halved `refine` times, as smooth as `trial_space` says."""
+    row = same_smoothness(np.array(knots), old, new)
+    for _ in range(refine):
+        row = halved(row)
+    return row
 
 
 def embedded(coefficients: Array, degrees: tuple[int, int, int], knots: Knots, space: TrialSpace) -> Array:

@@ -54,10 +54,12 @@ def stacks_of(patches: Sequence[Stacked], threads: int) -> Iterator[tuple[list[i
         of_map = volume.degrees, volume.shape, volume.weights is None
         found[of_map, space.degrees, space.shape, rule.shape, shape][same].append(number)
     for runs in found.values():
-        numbers = [number for own in runs.values() for number in sorted(own, key=lambda i: id(patches[i].rule))]
+        numbers = [
+            number for own in runs.values() for number in sorted(own, key=lambda i: _bytes(*patches[i].rule.points))
+        ]
         ends = np.cumsum([0, *map(len, runs.values())]).tolist()
-        volumes, spaces, rules, _, _ = zip(*(patches[number] for number in numbers), strict=True)
-        yield numbers, Stack(spaces, rules, threads, volumes, ends)
+        volumes, spaces, of_points, _, _ = zip(*(patches[number] for number in numbers), strict=True)
+        yield numbers, Stack(spaces, of_points, threads, volumes, ends)
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,7 +108,7 @@ class Stack:
         """
         keys: dict[Any, int] = {}
         each = zip(self.rules, splines, strict=True)
-        parts = ((id(rule), *(row.tobytes() for row in spline.knots)) for rule, spline in each)
+        parts = (_bytes(*rule.points, *spline.knots) for rule, spline in each)
         kinds = np.array([keys.setdefault(key, len(keys)) for key in parts], dtype=np.int64)
         firsts = np.unique(kinds, return_index=True)[1].tolist()
         return kinds, _joined([self.rules[i].tabulate(splines[i].degrees, splines[i].knots) for i in firsts])
@@ -249,6 +251,10 @@ def of_patches(found: Array, measure: Array) -> Array:
     """Return what a law gives for fields of `of_law` as (m, c, .., q_w, q_v); measure: (m, q_w, q_v)."""
     lead = found.shape[: found.ndim - 2 - (len(measure) > 1)]
     return np.moveaxis(found.reshape(*lead, *measure.shape), -3, 0)
+
+
+def _bytes(*rows: Array) -> tuple[bytes, ...]:
+    return tuple(row.tobytes() for row in rows)
 
 
 def _joined(tables: Sequence[kernels.Tables]) -> kernels.Tables:

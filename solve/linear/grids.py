@@ -5,6 +5,7 @@ smoothers are quick only along strong couplings (semicoarsening; Trottenberg, Oo
 section 5.1).
 """
 
+from collections import defaultdict
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -53,11 +54,17 @@ class Grid:
     @cached_property
     def points(self) -> Array:
         """Return the points (count, 3) of the free nodes."""
-        found = np.zeros((3, self.count + 1))
-        for patch, space, places in zip(self.body, self.unknowns.spaces, self.unknowns.places, strict=True):
-            u, v, w = space.knots
-            found[:, places] = np.moveaxis(patch.grid(u[1:-1], v[1:-1], w[1:-1]), -1, 0)
-        return found[:, :-1].T.copy()
+        found, places, spaces = np.zeros((self.count + 1, 3)), self.unknowns.places, self.unknowns.spaces
+        for group in self.body.groups:
+            alike = defaultdict(list)
+            for place, number in enumerate(group.numbers):
+                alike[tuple(row.tobytes() for row in spaces[number].knots)].append(place)
+            for chosen in alike.values():
+                numbers = group.numbers[chosen]
+                u, v, w = spaces[numbers[0]].knots
+                points = group.rows(np.array(chosen)).grid(u[1:-1], v[1:-1], w[1:-1])
+                found[np.stack([places[number] for number in numbers])] = points
+        return found[:-1]
 
     def coarser(self) -> "Grid | None":
         """Return the grid without every second node of some directions; None where no direction has inner nodes."""

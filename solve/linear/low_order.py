@@ -86,8 +86,10 @@ def trilinear(nodes: Glued, matrix: BodyMatrix) -> bsr_array:
     form, rules = matrix.laws[0].form, dict[Any, GaussRule]()
     laws = []
     for law, space in zip(matrix.laws, nodes.spaces, strict=True):
-        rule = rules.setdefault(tuple(row.tobytes() for row in space.knots), gauss_rule(space))
-        laws.append(law._replace(space=space, rule=rule, source=None))
+        key = tuple(row.tobytes() for row in space.knots)
+        if key not in rules:
+            rules[key] = gauss_rule(space)
+        laws.append(law._replace(space=space, rule=rules[key], source=None))
     whole, _ = assemble_body(nodes.layout, laws, matrix.parts[0].threads)
     is_scalar = laws[0].component is not None
     blocks = [whole] if is_scalar or form.symmetric else [whole.block(i) for i in range(form.components)]
