@@ -27,7 +27,8 @@ OTHERS = {
     | {"exchange": ("x < 1=1:1",)},
     ElasticityOptions(body_force="2;2;2"): SPACE
     | VECTOR
-    | {"traction": ("u1=1;1;1",), "young": 2.0, "poisson_ratio": 0.25, "fix": ("x < 1",), "roller": ("x < 1",)}
+    | {"traction": ("u1=1;1;1",), "young": 2.0, "poisson_ratio": 0.25, "formulation": "mixed"}
+    | {"fix": ("x < 1",), "roller": ("x < 1",)}
     | {"symmetry": ("x < 1",), "load": ("x < 1=1;1;1",), "pressure": ("x < 1=1",), "spring": ("x < 1=1",)},
 }
 

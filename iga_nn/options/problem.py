@@ -255,6 +255,8 @@ class ElasticityOptions(ProblemOptions):
             the traction of the exact solution.
         young: Young's modulus E; of several patches also one for each: "p0: 210, p1: 70".
         poisson_ratio: Poisson's ratio nu, as young.
+        formulation: "mixed" solves for displacement and pressure, as bodies that hardly change their volume need,
+            "displacement" for the displacement alone; by default mixed where Poisson's ratio exceeds 0.45.
         fix: regions of the boundary that are held, each as REGION, or "REGION=VECTOR" for a given displacement; an
             entry of the vector that is left out is free: "x < 1=0;;". A region is a condition on position and outward
             normal, "nz > 0.9 and x < 2", a face of the part, "face(x, y, z)", a group of the mesh, group:NAME, a
@@ -278,6 +280,7 @@ class ElasticityOptions(ProblemOptions):
     traction: tuple[str, ...] = ()
     young: float | str = 1.0
     poisson_ratio: float | str = 0.3
+    formulation: Literal["mixed", "displacement"] | None = None
     fix: tuple[str, ...] = ()
     roller: tuple[str, ...] = ()
     symmetry: tuple[str, ...] = ()
@@ -318,7 +321,7 @@ class ElasticityOptions(ProblemOptions):
 
     def solve_options(self) -> SolveOptions:
         """Return the options of the solve on the finest mesh; a slender body needs more iterations than a scalar."""
-        return replace(super().solve_options(), max_iterations=MOST_ITERATIONS)
+        return replace(super().solve_options(), max_iterations=MOST_ITERATIONS, formulation=self.formulation)
 
     @property
     def units(self) -> Units:
