@@ -27,7 +27,7 @@ from .solver import discretized
 from .system import System
 
 DOUBTFUL = 1e-3  # share of an eigenvalue from which on an error of it is told
-FACTORED = 15_000  # most unknowns of a matrix that is factorized: of a cube the factor takes 0.7 GB
+FACTORED = 15_000  # most unknowns of a matrix that is factorized: of a cube matrix and factor take 0.5 GB
 
 log = logging.getLogger(__name__)
 

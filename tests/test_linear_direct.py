@@ -67,4 +67,4 @@ def test_a_factor_takes_over_when_it_is_paid_for():
 def test_the_price_counts_products_and_the_factor():
     system = iga_nn.discretize(bent(), LAWS["strong"])
     price = price_of(system.unknowns, [patch.matrix for patch in system.patches], 3)
-    assert price == pytest.approx(3 * 5**3 / 2 + len(system.load) / 7)
+    assert price == pytest.approx(3 * 5**3 / 2 + len(system.load) / 20)

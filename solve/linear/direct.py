@@ -16,7 +16,7 @@ from .dissection import Dissection
 # Shares of its diagonal that are added to a matrix, tried in turn: rounding may make a positive matrix indefinite. The
 # first one is least: of a foil, 1 : 20 000, it is 1000 times the lowest eigenvalue.
 SHARES = tuple(10.0**k for k in range(-15, -7))
-PER_UNKNOWN = 7  # unknowns whose part of a factor takes the time of one iteration, on a cube of 6 591 unknowns
+PER_UNKNOWN = 20  # unknowns whose part of a factor takes the time of one iteration: on cubes it is 15 to 80
 
 
 def sparse(unknowns: Unknowns, matrices: Sequence[MatrixFree], components: int) -> csc_array:
