@@ -53,14 +53,14 @@ def draw_errors(
     path: Path, volume: iga_nn.BSplineVolume, solutions: Sequence[Solution], problem: iga_nn.Poisson
 ) -> None:
     """Draw |u - u_h| on the boundary and the three mid-sections, a row per mesh, as the paper's Fig. 14 does."""
-    points, fields = points_of(volume).patches, [error_of(volume, solution, problem) for solution in solutions]
+    points, fields = points_of(volume).planes, [error_of(volume, solution, problem) for solution in solutions]
     limits = error_range([field.everywhere for field in fields])
     figure, rows = panels_of(len(solutions), 4)
     for row, field, solution in zip(rows, fields, solutions, strict=True):
         for panel, title, shown in zip(row, ("boundary", *SECTIONS), (slice(6), *range(6, 9)), strict=True):
             whole = isinstance(shown, slice)
             chosen = range(6) if isinstance(shown, slice) else (shown,)
-            patches = [Patch(points[i], limits.colors(field.patches[i]), lit=False) for i in chosen]
+            patches = [Patch(points[i], limits.colors(field.planes[i]), lit=False) for i in chosen]
             cloud = np.concatenate([patch.points.reshape(-1, 3) for patch in patches])
             panel.imshow(draw(patches, widest_view(cloud, tilt=0.45 if whole else 0.0), PANEL))
             panel.set_title(title, fontsize=13)

@@ -1,21 +1,23 @@
 """Defines FieldGroup: functions on patches of equal degrees, knots and laws as one array, evaluated at once."""
 
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import chain
 from numbers import Real
 from typing import Any
 
 import numpy as np
 
 from parameterize.arrays import Array, IntArray
+from parameterize.spline.body import Body
 from parameterize.spline.patch_groups import PatchGroup
 from parameterize.spline.spline_stack import SplineStack
 
 from .field import FieldOnBody, Points, SplineField
 from .forms.boundary_value_problem import BoundaryValueProblem
 
-OF_PATCHES = ("prefix", "data", "faces", "conditions", "dirichlet")  # of problems whose law may yet be the same
+OF_PATCHES = {"prefix", "data", "faces", "conditions", "dirichlet"}  # of problems whose law may yet be the same
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,40 +49,67 @@ class FieldGroup:
         """Return some of the patches. rows: their places in the group."""
         return replace(self, numbers=self.numbers[rows], maps=self.maps.take(rows), values=self.values.take(rows))
 
+    def function_on(self, u: Array, v: Array, w: Array) -> Array:
+        """Return the functions (k, len(u), len(v), len(w), c) on a tensor grid of parameters, without a pressure."""
+        values = self.values.grid(u, v, w)
+        return values[..., :-1] if self.has_pressure else values
+
     def points_on(self, u: Array, v: Array, w: Array) -> Points:
         """Return the points (3, k, len(u), len(v), len(w)) of the patches on a tensor grid of parameters."""
         return Points.of(np.ascontiguousarray(np.moveaxis(self.maps.grid(u, v, w), -1, 0)), (u, v, w))
 
 
-def groups_of(function: FieldOnBody) -> tuple[FieldGroup, ...]:
-    """Return the patches of a function on a body in groups. Raises ValueError where the body is unknown."""
-    return tuple(group for own in function.on_body.groups for group in _divided(own, function.patches))
+def groups_of(
+    function: FieldOnBody, body: Body | None = None, problems: Sequence[BoundaryValueProblem] = ()
+) -> tuple[FieldGroup, ...]:
+    """Return the patches of a function on a body in groups. Raises ValueError where the body is unknown.
+
+    body: by default that of the function. problems: of the patches, by default those that the function knows.
+    """
+    glued, patches = body or function.on_body, function.patches
+    known: Sequence[BoundaryValueProblem | None]
+    known = problems or [getattr(patch, "problem", None) for patch in patches]
+    return tuple(group for own in glued.groups for group in _divided(own, patches, known))
 
 
-def _divided(maps: PatchGroup, patches: Sequence[SplineField]) -> list[FieldGroup]:
+def _divided(
+    maps: PatchGroup, patches: Sequence[SplineField], problems: Sequence[BoundaryValueProblem | None]
+) -> list[FieldGroup]:
     """Return the groups of equal functions and laws among patches with maps of equal degrees and knots."""
     members: dict[Any, list[int]] = defaultdict(list)
-    for row, number in enumerate(maps.numbers.tolist()):
+    laws = _laws([problems[number] for number in maps.numbers.tolist()])
+    for row, (number, law) in enumerate(zip(maps.numbers.tolist(), laws, strict=True)):
         own = patches[number]
-        members[own.degrees, own.pressure is None, *(knots.tobytes() for knots in own.knots), *_law_of(own)].append(row)
-    stack = SplineStack.of_maps(maps)
-    return [_group(maps.numbers[rows], stack.take(np.array(rows)), patches) for rows in members.values()]
+        members[own.degrees, own.pressure is None, *(knots.tobytes() for knots in own.knots), law].append(row)
+    stack = maps.stack
+    found = []
+    for rows in members.values():
+        numbers = maps.numbers[rows]
+        own = [patches[number] for number in numbers.tolist()]
+        values = SplineStack(own[0].degrees, own[0].knots, np.stack([patch.columns for patch in own]))
+        problem, has_pressure = problems[int(numbers[0])], own[0].pressure is not None
+        found.append(FieldGroup(numbers, stack.take(np.array(rows)), values, problem, has_pressure))
+    return found
 
 
-def _group(numbers: IntArray, maps: SplineStack, patches: Sequence[SplineField]) -> FieldGroup:
-    own = [patches[number] for number in numbers.tolist()]
-    values = SplineStack(own[0].degrees, own[0].knots, np.stack([patch.columns for patch in own]))
-    return FieldGroup(numbers, maps, values, getattr(own[0], "problem", None), own[0].pressure is not None)
-
-
-def _law_of(field: SplineField) -> tuple[Any, ...]:
-    """Return what the laws on two patches have in common if they are the same: numbers, and the identity of the rest.
+def _laws(problems: Sequence[BoundaryValueProblem | None]) -> Iterator[int]:
+    """Yield the number of the law of each problem: laws are the same with the same numbers and the same other parts.
 
     A datum that is a field is another one on each patch.
     """
-    problem: BoundaryValueProblem | None = getattr(field, "problem", None)
-    if problem is None:
-        return ()
-    own = (value for name, value in vars(problem).items() if name not in OF_PATCHES)
-    entries = (id(entry) for datum in problem.data.values() for entry in datum.entries)
-    return (*(value if isinstance(value, Real) else id(value) for value in own), *entries)
+    numbers: dict[Any, int] = {}  # of laws, by their numbers and the identity of the rest
+    known: dict[Any, int] = {}  # by the identity of all parts, which is found in no time
+    for problem in problems:
+        parts = () if problem is None else _parts(problem)
+        identity = tuple(map(id, parts))
+        if identity not in known:
+            law = tuple(part if isinstance(part, Real) else id(part) for part in parts)
+            known[identity] = numbers.setdefault(law, len(numbers))
+        yield known[identity]
+
+
+def _parts(problem: BoundaryValueProblem) -> tuple[Any, ...]:
+    """Return what the law of a problem consists of."""
+    own = vars(problem)
+    entries = chain.from_iterable(datum.entries for datum in problem.data.values())
+    return (*(value for name, value in own.items() if name not in OF_PATCHES), *entries)

@@ -307,8 +307,8 @@ def _zoomed(groups: Sequence[FieldGroup], together: Sequence[Quantity], start: _
 
 def _at(group: FieldGroup, quantity: Quantity, owners: IntArray, where: Array) -> Array:
     """Return a quantity (..., m) at parameters (m, 3) of patches (m,) of a group."""
-    u, slopes = group.values.at(owners, where)
-    x, jacobian = group.maps.at(owners, where)
+    u, slopes = group.values.at(owners, where), group.values.slopes_at(owners, where)
+    x, jacobian = group.maps.at(owners, where), group.maps.slopes_at(owners, where)
     u, slopes, jacobian = (np.moveaxis(part, 0, -1) for part in (u, slopes, jacobian))
     return _evaluated(quantity, u, slopes, jacobian, Points.at(np.ascontiguousarray(x.T), where), group.has_pressure)
 
@@ -316,7 +316,7 @@ def _at(group: FieldGroup, quantity: Quantity, owners: IntArray, where: Array) -
 def _peak(groups: Sequence[FieldGroup], best: _Candidates, row: int) -> tuple[float, Place, Place]:
     """Return the best value of one row, its point and its parameters."""
     group, where = groups[int(best.group[row, 0])], best.places[row]
-    point, _ = group.maps.at(best.rows[row], where)
+    point = group.maps.at(best.rows[row], where)
     return float(best.values[row, 0]), tuple(point[0].tolist()), tuple(where[0].tolist())
 
 

@@ -75,7 +75,7 @@ def test_a_range_counts_the_inside_where_no_section_passes():
     bump = "x*(1-x)*y*(1-y)*z*(1-z)*(1-2*x)*(1-2*y)*(1-2*z)"
     solution = solve.solve_problem(volume, solve.Poisson(exact=bump), refine=1)
     field = fields.solution_of(solution)
-    assert max(np.abs(patch).max() for patch in field.patches) < 1e-5
+    assert np.abs(field.planes).max() < 1e-5
     assert field.limits.high == pytest.approx((3.0**-0.5 / 6.0) ** 3, rel=0.01)
     assert field.limits.low == pytest.approx(-field.limits.high, rel=1e-2)
 
@@ -95,7 +95,7 @@ def test_no_value_that_is_drawn_lies_outside_the_range():
 
 def test_a_field_is_sampled_once_for_all_its_pictures(monkeypatch):
     volume, other, calls = benchmark_volume(1), benchmark_volume(1), []
-    monkeypatch.setattr(fields, "sampled", lambda found_at: calls.append(found_at) or fields.Samples([], []))
+    monkeypatch.setattr(fields, "sampled", lambda body, _: calls.append(body) or fields.Samples([], [], []))
     assert fields.points_of(volume) is fields.points_of(volume) and len(calls) == 1
     assert fields.points_of(other) is not fields.points_of(volume) and len(calls) == 2
 
@@ -154,12 +154,14 @@ def test_cut_shows_the_inside(tmp_path, drawing):
 def test_cut_leaves_out_the_part_that_looks_at_the_viewer():
     cube, size = benchmark_volume(1, amplitude=0.0), np.array([3.0, 2.0, 1.0])
     volume = replace(cube, control_points=cube.control_points * size)
-    patches = octant.patches_of(volume, [fields.points_on(volume, grid) for grid in fields.all_grids(9)])
-    corner, view = octant.best_cut(patches[:6])
+    planes = np.stack([fields.points_on(volume, grid) for grid in fields.all_grids(9)])
+    painted = octant.Painted(fields.Samples(np.arange(9), planes, np.empty(0)), octant.own_colors(volume))
+    corner, view = octant.best_cut(planes[:6])
     outward = 2.0 * np.array(corner) - 1.0
     assert np.all(np.sign(view.towards) == outward)
-    shown = octant.visible(volume, patches, octant.only(corner))
-    offsets = [(patch.points.reshape(-1, 3) / size - 0.5) * outward for patch in shown]
+    shown = octant.visible(volume, painted, octant.only(corner))
+    faces = [points for patch in shown for points in patch.points]
+    offsets = [(points.reshape(-1, 3) / size - 0.5) * outward for points in faces]
     assert not np.any(np.all(np.concatenate(offsets) > 1e-9, axis=1))  # nothing of the octant's outside
     planes = [np.flatnonzero(np.all(np.abs(offset) < 1e-12, axis=0)) for offset in offsets]
     assert sorted(np.concatenate(planes)) == [0, 1, 2]
@@ -177,10 +179,10 @@ def test_the_error_of_vectors_is_a_length():
     volume, problem = benchmark_volume(2), solve.Elasticity(exact=("x*y", "sin(z)", "x"))
     solution = solve.solve_problem(volume, problem)
     n, field = fields.SAMPLES, fields.error_of(volume, solution, problem)
-    x, y, z = np.moveaxis(fields.points_of(volume).patches[4], -1, 0)
+    x, y, z = np.moveaxis(fields.points_of(volume).planes[4], -1, 0)
     exact = np.stack([x * y, np.sin(z), x], axis=-1)
     found = solution.grid(*fields.all_grids(n)[4]).reshape(n, n, 3)
-    assert field.patches[4] == pytest.approx(np.linalg.norm(exact - found, axis=-1), abs=1e-14)
+    assert field.planes[4] == pytest.approx(np.linalg.norm(exact - found, axis=-1), abs=1e-14)
 
 
 def test_study_has_a_curve_a_degree(tmp_path):

@@ -35,14 +35,20 @@ def drawing() -> None:
 
 def coarse(body):
     """The faces and sections of each patch, of four cells each: a cell is a quarter."""
-    return cutaway.patches_of(body, [points_on(patch, grid) for patch in body for grid in all_grids(3)])
+    planes = np.stack([points_on(patch, grid) for patch in body for grid in all_grids(3)])
+    return cutaway.Painted(fields.Samples(np.arange(len(planes)), planes, np.empty(0)), cutaway.own_colors(body))
+
+
+def each(patches):
+    """The points (m, n, 3) of each face or section."""
+    return [points for patch in patches for points in patch.points]
 
 
 def edges_of(patches):
     """How often each edge of a cell occurs among patches."""
     counts = Counter()
-    for patch in patches:
-        x = np.round(patch.points, 9) + 0.0
+    for points in each(patches):
+        x = np.round(points, 9) + 0.0
         for i, j in np.ndindex(len(x) - 1, x.shape[1] - 1):
             corners = [tuple(x[at].tolist()) for at in ((i, j), (i + 1, j), (i + 1, j + 1), (i, j + 1))]
             counts.update(frozenset(pair) for pair in zip(corners, [*corners[1:], corners[0]], strict=True))
@@ -52,13 +58,13 @@ def edges_of(patches):
 @pytest.mark.parametrize("body", [TURNED, ring(1), ring(3)])
 def test_what_is_seen_of_a_body_is_a_closed_surface_whatever_is_left_out(body):
     """However patches are turned against each other, the quarters behind each other are known."""
-    patches, random = coarse(body), np.random.default_rng(3)
-    whole = cutaway.visible(body, patches, np.zeros((len(body), 2, 2, 2), dtype=bool))
-    assert [id(patch) for patch in whole] == [id(patches[k]) for k in outer_faces(body)]
+    painted, random = coarse(body), np.random.default_rng(3)
+    (whole,) = cutaway.visible(body, painted, np.zeros((len(body), 2, 2, 2), dtype=bool))
+    assert np.array_equal(whole.points, painted.points.planes[outer_faces(body)])
     for _ in range(5):
         left_out = random.random((len(body), 2, 2, 2)) < 0.4
-        seen = cutaway.visible(body, patches, left_out)
-        assert len(seen) > len(whole) and all(count % 2 == 0 for count in edges_of(seen).values())
+        seen = cutaway.visible(body, painted, left_out)
+        assert len(each(seen)) > len(whole.points) and all(count % 2 == 0 for count in edges_of(seen).values())
 
 
 def test_without_a_patch_the_face_behind_it_is_seen():
@@ -98,11 +104,44 @@ def test_a_field_of_a_body_is_that_of_each_patch():
     problem = solve.Poisson(exact="exp(X)*y")
     solution = iga_nn.solve(TURNED, problem)
     error = fields.error_of(TURNED, solution, problem)
-    assert len(error.patches) == 27 and [len(part) for part in error.lattices] == [fields.OF_SEVERAL[1]] * 3
+    assert len(error.planes) == 27 and [len(part) for part in error.lattices] == [fields.OF_SEVERAL[1]] * 3
     assert error.limits.high < 0.1 * fields.solution_of(solution).limits.high
     stiff = iga_nn.solve(TURNED, solve.Elasticity(fix="x < 0.01", load={"p1_u0": (0, 0, 1)}, young={0: 1, 1: 50, 2: 1}))
     stress, own = fields.fields_of(stiff)[0], stiff.patches[1].quantity_grid("von_mises", *all_grids(81)[0])
-    assert np.allclose(stress.patches[9], own.reshape(81, 81), rtol=1e-9)
+    assert np.allclose(stress.planes[9], own.reshape(81, 81), rtol=1e-9)
+
+
+@pytest.fixture
+def as_if_many(monkeypatch):
+    """Let three patches be sampled as thousands are: outer faces, and lattices without octants."""
+    monkeypatch.setattr(fields, "FEW", 0)
+    monkeypatch.setattr(fields, "OF_MANY", {2: (25, 11), np.inf: (9, 3)})
+
+
+def test_of_many_patches_the_inside_is_drawn_from_the_lattices(as_if_many, monkeypatch):
+    body, drawn = ring(3), shown(monkeypatch)
+    points = fields.points_of(body)
+    assert points.planes.shape == (12, 9, 9, 3) and points.lattices.shape == (3, 3, 3, 3, 3)
+    for place in range(27):
+        own = points_on(body.patches[place // 9], all_grids(9)[place % 9])
+        (part,) = points.divided(np.array([place]))
+        found = points.on(part)[0]
+        assert np.allclose(found, own if len(found) == 9 else own[::4, ::4], atol=1e-12)
+    left_out = cutaway.beyond(points, np.array([1.0, 0.0, 0.0]))
+    assert all(len(np.unique(one)) == 1 for one in left_out) and 0 < left_out.sum() < left_out.size
+    map_figures.draw_cut(None, body)
+    solution_figures.draw_solution(None, body, iga_nn.solve(body, solve.Poisson(exact="x*y+z")))
+    assert len(drawn) == 8 and {patch.points.shape[1] for patches in drawn for patch in patches} == {3, 9}
+
+
+def test_names_and_legends_of_very_many_patches_are_left_out(monkeypatch):
+    found = []
+    monkeypatch.setattr(map_figures, "show_around", lambda panels, patches, marks, names: found.append(names))
+    map_figures.draw_faces(None, ring(3))
+    monkeypatch.setattr(map_figures, "NAMED", 11)
+    map_figures.draw_faces(None, ring(3))
+    assert len(found[0]) == 12 and not found[1]
+    assert colors.color_labels(ring(81, shape=(2, 2, 2), degrees=(1, 1, 1))) == []
 
 
 def test_figures_show_all_patches(tmp_path, drawing, small_views):
@@ -133,14 +172,12 @@ def test_blocks_are_drawn_apart_and_their_interfaces_in_glass(monkeypatch, small
     found = shown(monkeypatch)
     figure = map_figures.draw_blocks(None, body)
     apart, glued = found
-    assert (
-        len(apart) == 18
-        and len(glued) == 6 + 12
-        and [patch.opacity < 1.0 for patch in glued] == [False] * 6 + [True] * 12
-    )
-    light = [k for k, patch in enumerate(apart) if np.allclose(patch.colors[0, 0], to_rgb(cutaway.INSIDE))]
+    (apart,) = apart
+    assert len(apart.points) == 18 and [len(patch.points) for patch in glued] == [6, 12]
+    assert [patch.opacity < 1.0 for patch in glued] == [False, True]
+    light = [k for k, colors in enumerate(apart.colors) if np.allclose(colors[0, 0], to_rgb(cutaway.INSIDE))]
     assert light == [6 * i + FACE_NAMES.index(face) for i in range(3) for face in ("u0", "u1")]
-    ends = [apart[1].points, apart[6].points]  # p0_u1 = p1_u0: the gap opens
+    ends = [apart.points[1], apart.points[6]]  # p0_u1 = p1_u0: the gap opens
     assert np.linalg.norm(ends[0] - ends[1], axis=-1).min() > 0.5
     assert figure.get_suptitle() == "3 blocks, 3 interfaces; glued faces are light"
     figure = map_figures.draw_blocks(None, glued_cubes([(0, 0, 0), (1, 0, 0)]))
@@ -155,7 +192,7 @@ def test_places_without_a_proof_and_meetings_are_shown_on_blocks(monkeypatch, sm
     meeting = Meeting(((0.5, 1.0, 0.5), (0.5, 0.0, 0.5)), (2.0, 0.0, 0.0), (0, 2))
     map_figures.draw_meeting(None, body, meeting)
     (glass, _), (parts, marks) = around
-    assert len(glass) == len(drawn[0]) == 12 and marks.tolist() == [[2.0, 0.0, 0.0]]
+    assert len(each(glass)) == len(each(drawn[0])) == 12 and marks.tolist() == [[2.0, 0.0, 0.0]]
     for part, owner, parameter in zip(parts, meeting.patches, meeting.parameters, strict=True):
         middle = part.points[len(part.points) // 2, part.points.shape[1] // 2]
         assert middle == pytest.approx(body.patches[owner]([parameter])[0])

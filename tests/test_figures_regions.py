@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from bodies import ring
 from matplotlib.colors import rgb_to_hsv
 from mesh_files import CUBE, TRIANGLES
 
@@ -38,7 +39,22 @@ def test_conditions_on_a_solid_have_their_shares_of_its_faces(drawn):
     assert legend(figure) == ["fix: u0", "load: nz > 0.9 and x > 0.75", "load: nz > 0.9"]
     found = shares(drawn[0], figures._palette(3))
     np.testing.assert_allclose(found, [1 / 6, 1 / 24, 3 / 24, 4 / 6], atol=2e-3)
-    assert np.all(drawn[0][0].colors == figures._palette(3)[0])  # u0 is the first face
+    assert np.all(drawn[0][0].colors[0] == figures._palette(3)[0])  # u0 is the first face
+
+
+def test_conditions_on_blocks_know_their_own_faces(drawn):
+    """Of four blocks in a ring one face is named, and the upper face of each."""
+    body = ring(4)
+    held = iga_nn.Elasticity(fix="p2_v1", load={"w1": (0, 0, 1)}, pressure={"nz < -0.9": 1})
+    figures.draw_conditions(None, body, held.conditions)
+    (patch,), palette = drawn[0], figures._palette(3)
+    found = {"rest": set(), "fix": set(), "load": set(), "pressure": set()}
+    for (owner, name), colors in zip(body.outer_faces, patch.colors, strict=True):
+        for kind, color in zip(("fix", "load", "pressure", "rest"), palette, strict=True):
+            if np.any(np.all(colors == color, axis=-1)):
+                found[kind].add(f"p{owner}_{name}")
+    assert found["fix"] == {"p2_v1"} and found["load"] == {f"p{k}_w1" for k in range(4)}
+    assert found["pressure"] == {f"p{k}_w0" for k in range(4)} and len(found["rest"]) == 7
 
 
 def test_regions_on_a_surface_end_within_triangles(drawn):

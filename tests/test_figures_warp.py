@@ -39,7 +39,7 @@ def test_a_body_is_deformed_and_a_temperature_is_not(stretched):
     points = fields.points_of(bar)
     assert points.diagonal == pytest.approx(18**0.5)
     assert warp_of(body, 18**0.5) == 8.0 and warp_of(body.field, 18**0.5) == 8.0
-    end = moved_by(points, body, 8.0)[1]
+    end = moved_by(points, body, 8.0).planes[1]
     assert end[..., 0] == pytest.approx(4.0 + 8 * 0.04, abs=1e-6)
     assert warp_of(solve.solve_problem(bar, solve.Poisson(exact="x")), 1.0) == 0.0
 

@@ -159,7 +159,7 @@ def test_the_cut_looks_into_the_body():
     cube, size = benchmark_volume(1, amplitude=0.0), np.array([3.0, 2.0, 1.0])
     volume = dataclasses.replace(cube, control_points=cube.control_points * size)
     turned, _, _ = reversed_along(volume, 1)
-    corner, view = cutaway.best_cut(cutaway.patches_of(turned, points_of(turned).patches)[:6], orientation(turned))
+    corner, view = cutaway.best_cut(points_of(turned).planes[:6], orientation(turned))
     place = turned(np.array([corner], dtype=float))[0] / size
     assert np.all(np.sign(view.towards) == np.round(2.0 * place - 1.0))
 

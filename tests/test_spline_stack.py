@@ -8,7 +8,6 @@ from bodies import ring
 
 import iga_nn
 from parameterize.spline.patch_groups import groups_of as groups_of_patches
-from parameterize.spline.spline_stack import SplineStack
 from solve.field_groups import groups_of
 
 
@@ -23,9 +22,9 @@ def patches(request):
 
 def test_a_stack_has_the_values_and_slopes_of_its_splines(patches):
     (group,) = groups_of_patches(patches)
-    stack, rows = SplineStack.of_maps(group), (np.linspace(0, 1, 3), np.array([0.2, 0.7]), np.array([1.0]))
+    stack, rows = group.stack, (np.linspace(0, 1, 3), np.array([0.2, 0.7]), np.array([1.0]))
     owners, where = np.array([2, 0, 1, 2]), np.random.default_rng(2).random((4, 3))
-    values, slopes = stack.at(owners, where)
+    values, slopes = stack.at(owners, where), stack.slopes_at(owners, where)
     for number, patch in enumerate(patches):
         np.testing.assert_allclose(stack.grid(*rows)[number], patch.grid(*rows), atol=1e-14)
         np.testing.assert_allclose(stack.grid_slopes(*rows)[number], patch.grid_jacobian(*rows), atol=1e-13)

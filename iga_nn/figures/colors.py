@@ -17,7 +17,7 @@ from parameterize.spline.volume import FACE_NAMES
 MAP = "viridis"  # colour map; perceptually uniform
 FACE_COLORS = ("#4477aa", "#66ccee", "#228833", "#ccbb44", "#ee6677", "#aa3377")  # also distinct for the colour-blind
 PATCH_COLORS = tuple(to_hex(color) for color in colormaps["tab20"].colors)  # type: ignore[attr-defined]
-NAMED = 4  # patches of one colour that its label names
+MOST_NAMED = 80  # patches: of more, too many have the same colour for a legend
 
 DECADES = 1e-4  # lower end of a logarithmic range over the largest error of the best mesh
 SMALLEST = 1e-200  # smaller fields have no ticks on their colour bar
@@ -38,17 +38,18 @@ def face_colors(body: BodyLike) -> list[str]:
 
 
 def color_labels(body: BodyLike) -> list[tuple[str, str]]:
-    """Return the legend of the colours: each with a label such as "u0: u = 0", of several patches such as "p3, p23"."""
+    """Return the legend of the colours: each with a label such as "u0: u = 0", of several patches such as "p3, p23".
+
+    Very many patches have no legend.
+    """
     glued = as_body(body)
     if glued.is_single:
         return list(zip(FACE_COLORS, face_labels(), strict=True))
+    if len(glued) > MOST_NAMED:
+        return []
     names = [f"p{i}" for i in range(len(glued))]
     alike = [names[i :: len(PATCH_COLORS)] for i in range(min(len(names), len(PATCH_COLORS)))]
-    return [(color, _shortened(each)) for color, each in zip(PATCH_COLORS, alike, strict=False)]
-
-
-def _shortened(names: Sequence[str]) -> str:
-    return ", ".join([*names[:NAMED], "…"] if len(names) > NAMED else names)
+    return [(color, ", ".join(each)) for color, each in zip(PATCH_COLORS, alike, strict=False)]
 
 
 @dataclass(frozen=True)

@@ -3,56 +3,72 @@
 Of a volume one octant is left out, of several patches the octants on one side of a plane.
 """
 
-from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
+from matplotlib.colors import to_rgba_array
 
-from parameterize.arrays import Array, Mask
+from parameterize.arrays import Array, IntArray, Mask
 from parameterize.spline.body import Body, BodyLike, as_body
-from parameterize.spline.interface import face_layer
+from parameterize.spline.interface_rows import kinds
 from parameterize.spline.orientation import orientation
 from parameterize.spline.volume import AXES, FACE_NAMES
 
 from .colors import face_colors
-from .fields import PER_PATCH, ColoredField, Samples
-from .render import Patch, View, plain_patch, view_of
+from .fields import ColoredField, Samples, outer_faces
+from .render import TILT, Patch, View, widest_view
 
 Octant = tuple[int, int, int]  # its corner of the cube: the sides, 0 or 1, of u, of v and of w
 
 INSIDE = "#e9e6df"  # colour of the sections, unlike the six colours of the faces
+WITH_OCTANTS = 5  # samples a direction of a lattice: with fewer, whole patches are left out of a body cut open
 
 
-def patches_of(body: BodyLike, points: Sequence[Array], every: int = 0) -> list[Patch]:
-    """Return the images of each patch's six faces, in their colours, and of u, v and w = 1/2, in one colour.
+@dataclass(frozen=True, eq=False)
+class Painted:
+    """The faces and sections of all patches of a body in colours, of which figures take those that are seen.
 
-    points: on each (m, n, 3). every: as in Patch.
+    points: where they are drawn. colors: a field, whose colours have no shading; or red, green and blue (9 patches, 3).
+    lines: spaces between the parameter lines of a patch, in both directions; 0 draws none.
     """
-    faces = np.reshape(face_colors(body), (-1, len(FACE_NAMES))).tolist()
-    named = [color for each in faces for color in (*each, INSIDE, INSIDE, INSIDE)]
-    return [plain_patch(where, color, every=every) for where, color in zip(points, named, strict=True)]
+
+    points: Samples
+    colors: ColoredField | Array
+    lines: int = 0
+    opacity: float = 1.0
+
+    def at(self, places: IntArray) -> list[Patch]:
+        """Return some places (k,) of all faces and sections as patches: one for all of equally many samples."""
+        return [self._patch(part) for part in self.points.divided(places)]
+
+    def _patch(self, places: IntArray) -> Patch:
+        points = self.points.on(places)
+        every = max(1, (points.shape[1] - 1) // self.lines) if self.lines else 0
+        if isinstance(self.colors, ColoredField):
+            return Patch(points, self.colors.limits.colors(self.colors.on(places)), lit=False, every=every)
+        colors = np.broadcast_to(self.colors[places, None, None], points.shape)
+        return Patch(points, colors, every=every, opacity=self.opacity)
 
 
-def colored(points: Sequence[Array], field: ColoredField, every: int = 0) -> list[Patch]:
-    """Return the patches at points (m, n, 3) in the colours of a field, without shading: they match its bar."""
-    return [
-        Patch(where, field.limits.colors(values), lit=False, every=every)
-        for where, values in zip(points, field.patches, strict=True)
-    ]
+def own_colors(body: BodyLike) -> Array:
+    """Return the colours (9 patches, 3) of the images of each patch's six faces, and of u, v and w = 1/2, in one."""
+    faces = np.reshape(face_colors(body), (-1, len(FACE_NAMES)))
+    named = np.concatenate([faces, np.full((len(faces), len(AXES)), INSIDE)], axis=1)
+    return to_rgba_array(named.ravel())[:, :3]
 
 
-def cut_of(body: BodyLike, faces: Sequence[Patch], points: Samples) -> tuple[Mask, View]:
+def cut_of(body: BodyLike, drawn: Samples, points: Samples) -> tuple[Mask, View]:
     """Return the octants (patches, 2, 2, 2) that are left out, and the view that shows most of the cut.
 
-    faces: the patches of the outer faces. points: of the body at rest. Of several patches the octants are left out that
-    lie in the upper half and towards the viewer.
+    drawn: the points as they are drawn. points: those of the body at rest. Of several patches the octants are left out
+    that lie in the upper half and towards the viewer.
     """
-    glued = as_body(body)
+    glued, outer = as_body(body), drawn.on(outer_faces(body))
     if glued.is_single:
-        octant, view = best_cut(faces, orientation(glued.only))
+        octant, view = best_cut(outer, orientation(glued.only))
         return only(octant), view
-    view = view_of(faces)
+    view = widest_view(outer.reshape(-1, 3), TILT)
     return beyond(points, view.towards) & beyond(points, view.up), view
 
 
@@ -64,68 +80,71 @@ def only(octant: Octant) -> Mask:
 
 
 def beyond(points: Samples, direction: Array) -> Mask:
-    """Return the octants (patches, 2, 2, 2) whose middles lie in the farther half of all middles along a direction."""
-    heights = np.stack([_middles(lattice) @ direction for lattice in points.lattices])
+    """Return the octants (patches, 2, 2, 2) whose middles lie in the farther half of all middles along a direction.
+
+    Lattices that have no middle planes of their octants tell whole patches.
+    """
+    lattices = points.lattices
+    count = 2 if lattices.shape[1] >= WITH_OCTANTS else 1
+    half = (lattices.shape[1] - 1) // count
+    heights = lattices[:, ::half, ::half, ::half] @ direction
+    for axis in (1, 2, 3):
+        heights = 0.5 * (np.take(heights, range(count), axis) + np.take(heights, range(1, count + 1), axis))
+    heights = np.broadcast_to(heights, (len(heights), 2, 2, 2))
     return heights > 0.5 * (heights.min() + heights.max())
 
 
-def _middles(lattice: Array) -> Array:
-    """Return the middles (2, 2, 2, 3) of the octants in a lattice (n, n, n, 3)."""
-    quarter, half = len(lattice) // 4, len(lattice) // 2
-    return lattice[quarter::half, quarter::half, quarter::half]
-
-
-def best_cut(faces: Sequence[Patch], hand: int = 1) -> tuple[Octant, View]:
+def best_cut(faces: Array, hand: int = 1) -> tuple[Octant, View]:
     """Return the octant of a volume to leave out and the view that together show most of the cut.
 
-    faces: six patches of m x m points, m odd. hand: the volume's orientation, 1 or -1.
+    faces: points (6, m, m, 3), m odd. hand: the volume's orientation, 1 or -1.
     The boundary of an octant is closed, so the area of its cut planes that
     faces the viewer is, with sign, that of its outer faces turned away; these are known from the faces alone.
     """
-    view, points = view_of(faces), [patch.points for patch in faces]
+    view = widest_view(faces.reshape(-1, 3), TILT)
     choices = [(octant, side) for octant in product((0, 1), (0, 1), (0, 1)) for side in (view, view.turned())]
-    return max(choices, key=lambda choice: hand * float(_outside(points, choice[0]) @ choice[1].towards))
+    return max(choices, key=lambda choice: hand * float(_outside(faces, choice[0]) @ choice[1].towards))
 
 
-def visible(body: BodyLike, patches: Sequence[Patch], left_out: Mask) -> list[Patch]:
-    """Return what is seen of a body, of whose patches nine each are given, without some octants (patches, 2, 2, 2).
+def visible(body: BodyLike, painted: Painted, left_out: Mask) -> list[Patch]:
+    """Return what is seen of a body without some octants (patches, 2, 2, 2).
 
-    Whole faces come first of each patch; faces and sections of which a part is seen are given in quarters.
+    Whole faces come first; faces and sections of which a part is seen are given in quarters.
     """
-    shown = []
-    for number, parts in enumerate(seen_quarters(body, left_out)):
-        own = list(zip(patches[PER_PATCH * number : PER_PATCH * (number + 1)], parts, strict=True))
-        shown += [patch for patch, part in own if part.all()]
-        partly = ((patch, part) for patch, part in own if part.any() and not part.all())
-        shown += [_quarter(patch, sides) for patch, part in partly for sides in np.argwhere(part).tolist()]
+    seen = seen_quarters(body, left_out).reshape(-1, 2, 2)
+    is_whole = seen.all(axis=(1, 2))
+    shown = painted.at(np.flatnonzero(is_whole))
+    for sides in np.ndindex(2, 2):
+        partly = np.flatnonzero(seen[:, *sides] & ~is_whole)
+        shown += [_quarter(patch, sides) for patch in painted.at(partly)]
     return shown
 
 
-def seen_quarters(body: BodyLike, left_out: Mask) -> Iterator[Mask]:
-    """Yield for each patch which quarters (9, 2, 2) of its six faces and three mid-sections are seen.
+def seen_quarters(body: BodyLike, left_out: Mask) -> Mask:
+    """Return which quarters (patches, 9, 2, 2) of each patch's six faces and three mid-sections are seen.
 
     left_out: octants (patches, 2, 2, 2). A quarter of a face is seen where its octant is there and nothing lies behind
     it: the outside, or an octant of the patch it is glued to that is left out. A quarter of a section is seen between
     two octants of which one is left out.
     """
-    behind = _behind(as_body(body), left_out)
-    for number, own in enumerate(left_out):
-        faces = [~face_layer(own, name) & behind.get((number, name), np.bool_(True)) for name in FACE_NAMES]
-        sections = [np.take(own, 0, axis) != np.take(own, 1, axis) for axis in range(3)]
-        yield np.stack([*faces, *sections])
+    faces = np.stack([np.take(left_out, side, 1 + axis) for axis in range(3) for side in (0, 1)], axis=1)
+    sections = [np.take(left_out, 0, 1 + axis) != np.take(left_out, 1, 1 + axis) for axis in range(3)]
+    return np.concatenate([~faces & _behind(as_body(body), faces), np.stack(sections, axis=1)], axis=1)
 
 
-def _behind(body: Body, left_out: Mask) -> dict[tuple[int, str], Mask]:
-    """Return for each glued face whether the octants (2, 2) behind it are left out."""
-    found = {}
-    for interface in body.interfaces:
-        (p, face_p), (q, face_q) = interface.first, interface.second
-        places = interface.turned(np.arange(4).reshape(2, 2))  # of the second face's quarters, in the first's order
-        first, second = face_layer(left_out[p], face_p), face_layer(left_out[q], face_q)
-        found[p, face_p] = second.ravel()[places]
-        found[q, face_q] = np.empty((2, 2), dtype=bool)
-        found[q, face_q].ravel()[places.ravel()] = first.ravel()
-    return found
+def _behind(body: Body, faces: Mask) -> Mask:
+    """Return whether the octants (patches, 6, 2, 2) behind each face are left out, those outside of the body included.
+
+    faces: whether the octants at each face are left out.
+    """
+    behind = np.ones(faces.shape, dtype=bool).reshape(-1, len(FACE_NAMES), 4)
+    quarters, rows = faces.reshape(behind.shape), body.interface_rows
+    for kind, members in kinds(rows, np.zeros(len(body), dtype=np.int64)):
+        p, face_p, q, face_q = rows[members, :4].T
+        places = kind.turned(np.arange(4).reshape(2, 2)).ravel()  # of the second face's quarters, in the first's order
+        behind[p, face_p] = quarters[q, face_q][:, places]
+        behind[q[:, None], face_q[:, None], places] = quarters[p, face_p]
+    return behind.reshape(faces.shape)
 
 
 def octant_label(octant: Octant) -> str:
@@ -138,12 +157,12 @@ def _half(samples: int, side: int) -> slice:
     return slice(middle, None) if side else slice(middle + 1)
 
 
-def _quarter(patch: Patch, sides: Sequence[int]) -> Patch:
-    rows, columns = (_half(n, side) for n, side in zip(patch.points.shape[:2], sides, strict=True))
-    return replace(patch, points=patch.points[rows, columns], colors=patch.colors[rows, columns])
+def _quarter(patch: Patch, sides: tuple[int, ...]) -> Patch:
+    rows, columns = (_half(n, side) for n, side in zip(patch.points.shape[-3:-1], sides, strict=True))
+    return replace(patch, points=patch.points[..., rows, columns, :], colors=patch.colors[..., rows, columns, :])
 
 
-def _outside(faces: Sequence[Array], octant: Octant) -> Array:
+def _outside(faces: Array, octant: Octant) -> Array:
     """Return the vector area (3,) of the octant's three outer faces, outward on a right-handed volume."""
     total = np.zeros(3)
     for axis, side in enumerate(octant):

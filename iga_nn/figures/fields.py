@@ -4,7 +4,8 @@ Figures and the interactive view colour a field by one range, which counts every
 mid-sections and inside. Whatever is drawn is among the samples, so no value that is drawn lies outside.
 
 Where something is listed for the faces and sections of all patches, each patch has nine entries: six faces, in the
-order of FACE_NAMES, three sections.
+order of FACE_NAMES, three sections. Their number among those of all patches is their place: nine times the number of
+the patch, and the number among the nine.
 """
 
 import math
@@ -17,21 +18,25 @@ from typing import Any, Self, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from parameterize.arrays import Array
-from parameterize.quality.distortion import arap_on, own_boxes
+from parameterize.arrays import Array, IntArray
+from parameterize.quality.distortion import in_boxes, own_boxes, unmirrored
 from parameterize.spline.body import BodyLike, as_body
-from parameterize.spline.volume import AXES, FACE_NAMES, BSplineVolume
-from solve.field import FieldOnBody, Points, SplineField
+from parameterize.spline.orientation import orientations
+from parameterize.spline.spline_stack import SplineStack
+from parameterize.spline.volume import AXES, BSplineVolume
+from solve.field import FieldOnBody, Points
+from solve.field_groups import FieldGroup, groups_of
 from solve.forms.boundary_value_problem import BoundaryValueProblem
 from solve.forms.form import Quantity
 from solve.forms.frame import UnitFrame
-from solve.quantities import grid_values
+from solve.quantities import group_values
 
 from ..options import Units
 from .colors import SMALLEST, ColorRange, error_range, even_range, with_unit
 
 Grid = tuple[Array, Array, Array]  # parameters of a tensor grid; on a face or a section one direction has one value
-OnGrid = Callable[[Array, Array, Array], Array]  # takes a tensor grid and gives (n_u, n_v, n_w, ...)
+OnGrid = Callable[[IntArray, Array, Array, Array], Array]  # takes some patches of a group and a tensor grid
+Parts = Sequence[tuple[IntArray, OnGrid]]  # groups: the numbers of the patches, and (k, n_u, n_v, n_w, ...) on some
 Result = TypeVar("Result")
 
 SECTIONS = tuple(f"{axis} = 1/2" for axis in AXES)
@@ -41,7 +46,10 @@ PER_PATCH = len(PLANES)  # faces and sections
 SAMPLES = 121  # per direction of a face or mid-section
 LATTICE = 41  # per direction of the cube
 OF_SEVERAL = 81, 21  # the same of each of several patches
-MANY, OF_MANY = 8, (41, 11)  # patches, and the same of each of more: figures and pages keep their seconds and size
+FEW = 8  # patches: of more, only outer faces are sampled beside the lattice
+OF_MANY = {150: (25, 11), 1000: (17, 5), 7400: (9, 3), math.inf: (5, 2)}  # of each of as many: pages keep their size
+LINED = 10_000  # patches: of more, borders would cover the colours
+NAMED = 300  # outer faces whose names can be read in a picture
 KEPT = 2  # results of one function
 
 STRESS = "von Mises"  # the name of the field that a body is drawn in
@@ -67,38 +75,35 @@ def face_window(parameter: ArrayLike, half: float, samples: int) -> Grid:
     return u, v, w
 
 
-def flat(values: Array) -> Array:
-    """Return the values of a grid without the direction that has a single parameter."""
-    axis = next(a for a in range(3) if values.shape[a] == 1)
-    return np.asarray(values.squeeze(axis))
-
-
 def points_on(volume: BSplineVolume, grid: Grid) -> Array:
     """Return the points (samples, samples, 3) of a grid on a face or section."""
-    return flat(volume.grid(*grid))
+    points = volume.grid(*grid)
+    return np.asarray(points.squeeze(next(a for a in range(3) if points.shape[a] == 1)))
 
 
-def outer_faces(body: BodyLike) -> list[int]:
-    """Return the places of the faces that are not glued among the nine faces and sections of each patch."""
-    return [PER_PATCH * patch + FACE_NAMES.index(face) for patch, face in as_body(body).outer_faces]
+def outer_faces(body: BodyLike) -> IntArray:
+    """Return the places of the faces that are not glued among the nine faces and sections of each patch, ascending."""
+    patches, faces = np.nonzero(~as_body(body).glued)
+    return PER_PATCH * patches + faces
 
 
 @dataclass(frozen=True, eq=False)
 class Samples:
     """Hold values at the same places of each patch's cube.
 
-    patches: nine arrays (SAMPLES, SAMPLES, ...) for each patch of the body, on the faces in the order of FACE_NAMES,
-    then on u, v, w = 1/2. lattices: (LATTICE, LATTICE, LATTICE, ...) for each patch, at even steps of u, v and w, both
-    ends included.
+    places: (m,), of the faces and sections that are sampled themselves, ascending: all nine of each patch, of many
+    patches the outer faces. planes: (m, SAMPLES, SAMPLES, ...), on these. lattices: (patches, LATTICE, LATTICE,
+    LATTICE, ...), at even steps of u, v and w, both ends included.
     """
 
-    patches: Sequence[Array]
-    lattices: Sequence[Array]
+    places: IntArray
+    planes: Array
+    lattices: Array
 
     @property
     def everywhere(self) -> list[Array]:
-        """Return all arrays, of patches and lattices."""
-        return [*self.patches, *self.lattices]
+        """Return all arrays, of planes and lattices."""
+        return [self.planes, self.lattices]
 
     @property
     def cloud(self) -> Array:
@@ -112,7 +117,23 @@ class Samples:
 
     def each(self, change: Callable[[Array], Array]) -> "Samples":
         """Return the samples that a function of arrays makes of these."""
-        return Samples([change(values) for values in self.patches], [change(values) for values in self.lattices])
+        return Samples(self.places, change(self.planes), change(self.lattices))
+
+    def divided(self, places: IntArray) -> list[IntArray]:
+        """Return some places as those that are sampled themselves and those in the lattices, without empty parts."""
+        own = np.isin(places, self.places)
+        return [part for part in (places[own], places[~own]) if len(part)]
+
+    def on(self, places: IntArray) -> Array:
+        """Return the values (k, n, n, ...) at places, all of one of the parts that `divided` returns."""
+        if places[0] in self.places:
+            return self.planes[np.searchsorted(self.places, places)]
+        found = np.empty((len(places), *self.lattices.shape[2:]))
+        patches, planes = np.divmod(places, PER_PATCH)
+        for number, (axis, value) in enumerate(PLANES):
+            chosen, layer = np.flatnonzero(planes == number), round(value * (self.lattices.shape[1] - 1))
+            found[chosen] = np.take(self.lattices[patches[chosen]], layer, axis=1 + axis)
+        return found
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,7 +151,7 @@ class ColoredField(Samples):
     @classmethod
     def ranging(cls, samples: Samples, name: str, title: str) -> Self:
         """Return the field of samples, whose range is from its lowest to its highest value."""
-        return cls(samples.patches, samples.lattices, name, title, even_range(samples.everywhere))
+        return cls(samples.places, samples.planes, samples.lattices, name, title, even_range(samples.everywhere))
 
 
 def remembered(function: Callable[..., Result]) -> Callable[..., Result]:
@@ -149,51 +170,124 @@ def remembered(function: Callable[..., Result]) -> Callable[..., Result]:
     return found
 
 
-def sampled(values_on: Sequence[OnGrid]) -> Samples:
-    """Return the samples of a function on each patch."""
-    count = len(values_on)
-    samples, lattice = (SAMPLES, LATTICE) if count == 1 else OF_SEVERAL if count <= MANY else OF_MANY
-    even, grids = np.linspace(0.0, 1.0, lattice), all_grids(samples)
-    return Samples(
-        [flat(values_at(*grid)) for values_at in values_on for grid in grids],
-        [values_at(even, even, even) for values_at in values_on],
-    )
+def sampled(body: BodyLike, parts: Parts) -> Samples:
+    """Return the samples of a function on the patches of a body, which is given on groups of them."""
+    count, (samples, lattice) = len(as_body(body)), sizes_of(body)
+    places = np.arange(PER_PATCH * count) if count <= FEW else outer_faces(body)
+    even = np.linspace(0.0, 1.0, lattice)
+    every = [(numbers, values_on(np.arange(len(numbers)), even, even, even)) for numbers, values_on in parts]
+    return Samples(places, on_planes(parts, places, samples), _in_order(every, count))
+
+
+def sizes_of(body: BodyLike) -> tuple[int, int]:
+    """Return the numbers of samples per direction of a face or section, and of the cube."""
+    count = len(as_body(body))
+    several = next(sizes for most, sizes in OF_MANY.items() if count <= most)
+    return (SAMPLES, LATTICE) if count == 1 else OF_SEVERAL if count <= FEW else several
+
+
+def lines_of(body: BodyLike, wanted: int) -> int:
+    """Return the number of spaces between parameter lines of each patch: fewer of many, of very many no lines."""
+    count = len(as_body(body))
+    return wanted if count <= next(iter(OF_MANY)) else 1 if count <= LINED else 0
+
+
+def on_planes(parts: Parts, places: IntArray, samples: int) -> Array:
+    """Return values (k, samples, samples, ...) at some places (k,) among the faces and sections of all patches."""
+    patches, planes = np.divmod(places, PER_PATCH)
+    found = []
+    for number, grid in enumerate(all_grids(samples)):
+        on_plane = np.flatnonzero(planes == number)
+        for numbers, values_on in parts:
+            chosen = on_plane[np.isin(patches[on_plane], numbers)]
+            if chosen.size:
+                values = values_on(np.searchsorted(numbers, patches[chosen]), *grid)
+                found.append((chosen, np.squeeze(values, axis=1 + PLANES[number][0])))
+    return _in_order(found, len(places))
+
+
+def _in_order(parts: Sequence[tuple[IntArray, Array]], count: int) -> Array:
+    """Return values (count, ...), of which each part has those at its numbers."""
+    found = np.empty((count, *parts[0][1].shape[1:]))
+    for numbers, values in parts:
+        found[numbers] = values
+    return found
 
 
 @remembered
 def points_of(body: BodyLike) -> Samples:
     """Return the points (..., 3) of a body."""
-    return sampled([patch.grid for patch in as_body(body)])
+    return sampled(body, maps_of(body))
 
 
-def arap_of(body: BodyLike) -> list[OnGrid]:
-    """Return for each patch the function that gives the ARAP distortion.
+def maps_of(body: BodyLike) -> Parts:
+    """Return the function that gives the points (..., 3) of a body."""
+    return [(group.numbers, _grid_of(group.stack)) for group in as_body(body).groups]
+
+
+def slopes_of(body: BodyLike) -> Parts:
+    """Return the function that gives the first derivatives (..., 3, 3) of a body's maps."""
+    return [(group.numbers, _slopes_of(group.stack)) for group in as_body(body).groups]
+
+
+def _slopes_of(splines: SplineStack) -> OnGrid:
+    return lambda rows, u, v, w: splines.take(rows).grid_slopes(u, v, w)
+
+
+def _grid_of(splines: SplineStack) -> OnGrid:
+    return lambda rows, u, v, w: splines.take(rows).grid(u, v, w)
+
+
+def arap_of(body: BodyLike) -> Parts:
+    """Return the function that gives the ARAP distortion.
 
     A volume is measured at volume 1, each of several patches against its own box.
     """
     glued = as_body(body)
-    boxes = [UnitFrame.of(glued).length] if glued.is_single else own_boxes(glued)
-    return [partial(arap_on, patch, box=box) for patch, box in zip(glued, boxes, strict=True)]
+    boxes = np.full((1, 3), UnitFrame.of(glued).length) if glued.is_single else own_boxes(glued)
+    return [
+        (group.numbers, partial(_arap_on, group.stack, orientations(group), boxes[group.numbers]))
+        for group in glued.groups
+    ]
+
+
+def _arap_on(maps: SplineStack, hands: IntArray, boxes: Array, rows: IntArray, u: Array, v: Array, w: Array) -> Array:
+    return in_boxes(unmirrored(maps.take(rows).grid_slopes(u, v, w), hands[rows]), boxes[rows])
 
 
 @remembered
 def distortion_of(body: BodyLike) -> ColoredField:
     """Return tanh(sqrt(ARAP) / 2), as the paper colours it, at volume 1; of several patches, each in its own box."""
-    shares = sampled(arap_of(body)).each(lambda arap: np.tanh(np.sqrt(arap) / 2.0))
+    shares = sampled(body, arap_of(body)).each(lambda arap: np.tanh(np.sqrt(arap) / 2.0))
     title = f"tanh(√ARAP / 2), {'at volume 1' if as_body(body).is_single else 'each in its own box'}"
-    return ColoredField(shares.patches, shares.lattices, "distortion", title, ColorRange(0.0, 1.0))
+    return ColoredField(shares.places, shares.planes, shares.lattices, "distortion", title, ColorRange(0.0, 1.0))
 
 
 @remembered
 def vectors_of(solution: FieldOnBody) -> Samples:
     """Return the vectors (..., c) of a solution of several components, or its values (...)."""
-    return sampled([field.grid for field in solution.patches])
+    return sampled(solution.on_body, vectors_on(solution))
+
+
+def vectors_on(solution: FieldOnBody) -> Parts:
+    """Return the function that gives the vectors (..., c) of a solution of several components, or its values (...)."""
+    return [(group.numbers, partial(_values_on, group, is_vector(solution))) for group in groups_of(solution)]
+
+
+def is_vector(solution: FieldOnBody) -> bool:
+    """Return whether a solution has an axis of components."""
+    return solution.patches[0].coefficients.ndim == 4
+
+
+def _values_on(group: FieldGroup, with_axis: bool, rows: IntArray, u: Array, v: Array, w: Array) -> Array:
+    values = group.values.take(rows).grid(u, v, w)
+    return values if with_axis else values[..., 0]
 
 
 @remembered
 def solution_of(solution: FieldOnBody) -> ColoredField:
     """Return u_h, or the length of a vector u_h."""
-    if solution.patches[0].coefficients.ndim == 3:  # one number a point, without an axis of components
+    if not is_vector(solution):
         return ColoredField.ranging(vectors_of(solution), "solution", "u")
     return ColoredField.ranging(vectors_of(solution).each(lambda u: np.linalg.norm(u, axis=-1)), "|u|", "|u|")
 
@@ -214,16 +308,22 @@ def quantity_of(
 ) -> ColoredField | None:
     """Return a quantity of one number a point, a function of u, grad and x; None where it is not finite everywhere.
 
-    quantity: of several patches also a function for each, where their materials differ.
+    quantity: also a function for each group of patches, whose materials differ, see `solve.field_groups`.
     """
-    laws = quantity if isinstance(quantity, Sequence) else [quantity] * len(solution.patches)
+    groups = groups_of(solution)
+    laws = quantity if isinstance(quantity, Sequence) else [quantity] * len(groups)
+    parts = [(group.numbers, partial(_quantity_on, group, law)) for group, law in zip(groups, laws, strict=True)]
     try:
-        samples = sampled([partial(grid_values, *pair) for pair in zip(solution.patches, laws, strict=True)])
+        samples = sampled(solution.on_body, parts)
     except np.linalg.LinAlgError:  # det J = 0
         return None
     if not all(np.all(np.isfinite(values)) for values in samples.everywhere):
         return None
     return ColoredField.ranging(samples, name, title)
+
+
+def _quantity_on(group: FieldGroup, quantity: Quantity, rows: IntArray, u: Array, v: Array, w: Array) -> Array:
+    return group_values(group.take(rows), quantity, u, v, w)
 
 
 @remembered
@@ -232,8 +332,8 @@ def fields_of(solution: FieldOnBody) -> list[ColoredField]:
     fields = [solution_of(solution)]
     if is_spatial(solution):
         fields += components_of(solution)
-    laws = [(quantities_of(field) or {}).get("von_mises") for field in solution.patches]
-    if None not in laws:
+    laws = [group.problem.form.quantities.get("von_mises") for group in groups_of(solution) if group.problem]
+    if laws and None not in laws:
         stress = quantity_of(solution, [law for law in laws if law], STRESS, "von Mises stress")
         return fields if stress is None else [stress, *fields]
     return fields
@@ -255,16 +355,19 @@ def error_at(values: Array, problem: BoundaryValueProblem, x: Points) -> Array:
 @remembered
 def error_of(body: BodyLike, solution: FieldOnBody, problem: BoundaryValueProblem) -> ColoredField:
     """Return |u - u_h|, whose range is logarithmic. problem: its exact solution is known."""
-    parts = zip(as_body(body), solution.patches, problems_on(problem, body), strict=True)
-    samples = sampled([partial(_error_on, *part) for part in parts])
+    groups = groups_of(solution, as_body(body), problems_on(problem, body))
+    parts = [(group.numbers, partial(_error_on, group, is_vector(solution))) for group in groups]
+    samples = sampled(body, parts)
     limits = error_range([samples.everywhere])
-    return ColoredField(samples.patches, samples.lattices, "error", "|u − uₕ|", limits)
+    return ColoredField(samples.places, samples.planes, samples.lattices, "error", "|u − uₕ|", limits)
 
 
-def _error_on(
-    patch: BSplineVolume, field: SplineField, problem: BoundaryValueProblem, u: Array, v: Array, w: Array
-) -> Array:
-    return error_at(field.grid(u, v, w), problem, Points.on(patch, u, v, w))
+def _error_on(group: FieldGroup, with_axis: bool, rows: IntArray, u: Array, v: Array, w: Array) -> Array:
+    chosen = group.take(rows)
+    assert chosen.problem is not None  # it is given
+    return error_at(
+        _values_on(chosen, with_axis, np.arange(len(rows)), u, v, w), chosen.problem, chosen.points_on(u, v, w)
+    )
 
 
 def quantities_of(solution: FieldOnBody) -> Mapping[str, Quantity] | None:

@@ -1,9 +1,10 @@
 """Draws a map: faces, blocks, parameter lines, cut, distortion, and where it is not proved or meets itself."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
+from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 
 from parameterize.arrays import Array
@@ -11,9 +12,19 @@ from parameterize.certificate.boundary import Meeting
 from parameterize.spline.body import Body, BodyLike, as_body
 from parameterize.spline.volume import FACE_NAMES
 
-from .colors import face_colors
-from .cutaway import INSIDE, colored, cut_of, octant_label, patches_of, visible
-from .fields import PER_PATCH, SAMPLES, distortion_of, face_window, outer_faces, points_of, points_on
+from .cutaway import INSIDE, Painted, cut_of, octant_label, own_colors, visible
+from .fields import (
+    NAMED,
+    PER_PATCH,
+    SAMPLES,
+    Samples,
+    distortion_of,
+    face_window,
+    lines_of,
+    outer_faces,
+    points_of,
+    points_on,
+)
 from .render import NAMELESS, Patch, check_drawable, plain_patch, view_of
 from .style import color_bar, name_colors, panels_of, save, show, show_around, show_inside
 
@@ -27,25 +38,33 @@ INTERFACE = "#ee6677"
 def draw_faces(path: str | Path | None, body: BodyLike, marks: Array | None = None) -> Figure:
     """Draw the images of the six faces of the cube, each in its colour, from the front and from behind.
 
-    Of several patches the outer faces are drawn, in the colour of their patch and with their names. marks: points (k,
-    3) shown as black balls, such as given corners (the paper's Fig. 13).
+    Of several patches the outer faces are drawn, in the colour of their patch and, up to NAMED, with their names.
+    marks: points (k, 3) shown as black balls, such as given corners (the paper's Fig. 13).
     """
     glued = as_body(body)
     if glued.is_single:
         return _draw_around(path, body, 0, "Images of the six faces of the unit cube", marks)
-    return _draw_around(path, body, 0, "The patches and their outer faces", marks, _names_of(glued))
+    names = _names_of(glued) if len(outer_faces(glued)) <= NAMED else NAMELESS
+    return _draw_around(path, body, 0, "The patches and their outer faces", marks, names)
 
 
 def _names_of(body: Body) -> dict[str, Array]:
     """Return the names of the outer faces of patches, each with the point in the middle of the face."""
-    patches = points_of(body).patches
-    named = {body.face_name(k // PER_PATCH, FACE_NAMES[k % PER_PATCH]): patches[k] for k in outer_faces(body)}
-    return {name: points[len(points) // 2, len(points) // 2] for name, points in named.items()}
+    places = outer_faces(body)
+    faces = points_of(body).on(places)
+    middles = faces[:, faces.shape[1] // 2, faces.shape[2] // 2]
+    names = [body.face_name(k // PER_PATCH, FACE_NAMES[k % PER_PATCH]) for k in places.tolist()]
+    return dict(zip(names, middles, strict=True))
 
 
 def draw_lines(path: str | Path | None, body: BodyLike) -> Figure:
-    """Draw lines of constant parameters, a tenth apart, on the outer faces, from the front and from behind."""
-    return _draw_around(path, body, LINES, "Lines of constant u, v, w, a tenth apart")
+    """Draw lines of constant parameters, a tenth apart, on the outer faces, from the front and from behind.
+
+    Of many patches the borders are drawn.
+    """
+    lines = lines_of(body, LINES)
+    title = "Lines of constant u, v, w, a tenth apart" if lines == LINES else "The outer faces of the patches"
+    return _draw_around(path, body, lines, title)
 
 
 def _draw_around(
@@ -57,16 +76,10 @@ def _draw_around(
     names: Mapping[str, Array] = NAMELESS,
 ) -> Figure:
     figure, (panels,) = panels_of(1, 2)
-    patches = _patches_with(body, lines)
-    show_around(panels, [patches[k] for k in outer_faces(body)], marks, names)
+    painted = Painted(points_of(body), own_colors(body), lines)
+    show_around(panels, painted.at(outer_faces(body)), marks, names)
     name_colors(figure, body)
     return save(figure, path, title)
-
-
-def _patches_with(body: BodyLike, lines: int) -> list[Patch]:
-    """Return the faces and sections of a body with as many spaces between parameter lines, 0 for no lines."""
-    points = points_of(body).patches
-    return patches_of(body, points, (len(points[0]) - 1) // lines if lines else 0)
 
 
 def draw_cut(path: str | Path | None, body: BodyLike) -> Figure:
@@ -75,12 +88,13 @@ def draw_cut(path: str | Path | None, body: BodyLike) -> Figure:
     The octant and the view are those that show most of the cut. Of several patches the octants that lie in the upper
     half and towards the viewer are left out.
     """
-    named, field = _patches_with(body, LINES), distortion_of(body)
-    left_out, view = cut_of(body, [named[k] for k in outer_faces(body)], points_of(body))
-    distorted = colored(points_of(body).patches, field, named[0].every)
+    points, field, lines = points_of(body), distortion_of(body), lines_of(body, LINES)
+    left_out, view = cut_of(body, points, points)
     figure, (panels,) = panels_of(1, 2)
-    for panel, patches in zip(panels, (named, distorted), strict=True):
-        show(panel, "", visible(body, patches, left_out), view)
+    for panel, painted in zip(
+        panels, (Painted(points, own_colors(body), lines), Painted(points, field, lines)), strict=True
+    ):
+        show(panel, "", visible(body, painted, left_out), view)
     name_colors(figure, body)
     color_bar(figure, panels, field.limits, field.title)
     if not as_body(body).is_single:
@@ -96,7 +110,7 @@ def draw_distortion(path: str | Path | None, body: BodyLike) -> Figure:
     """
     figure, (panels,) = panels_of(1, 3)
     field, points = distortion_of(body), points_of(body)
-    show_inside(panels, body, points, colored(points.patches, field))
+    show_inside(panels, body, points, Painted(points, field))
     color_bar(figure, panels, field.limits, field.title)
     is_single = as_body(body).is_single
     return save(figure, path, "Distortion on the mid-sections" if is_single else "Distortion of the patches inside")
@@ -104,32 +118,27 @@ def draw_distortion(path: str | Path | None, body: BodyLike) -> Figure:
 
 def draw_blocks(path: str | Path | None, body: Body) -> Figure:
     """Draw the blocks apart, each in its colour and with light glued faces, and the interfaces in the glass body."""
-    points, outer = points_of(body).patches, outer_faces(body)
-    every = [PER_PATCH * number + face for number in range(len(body)) for face in range(len(FACE_NAMES))]
-    glued = [k for k in every if k not in set(outer)]
-    palette, moves = face_colors(body), _moves(points, len(body))
-    apart = [
-        plain_patch(points[k] + moves[k // PER_PATCH], INSIDE if k in set(glued) else palette[number])
-        for number, k in enumerate(every)
-    ]
-    view = view_of([plain_patch(points[k], "0.6") for k in outer])
-    interfaces = [plain_patch(points[k], INTERFACE) for k in glued]
+    places = np.flatnonzero(np.arange(PER_PATCH * len(body)) % PER_PATCH < len(FACE_NAMES))
+    outer, colors, moved = outer_faces(body), own_colors(body), _apart(points_of(body))
+    glued = np.setdiff1d(places, outer)
+    colors[glued] = to_rgb(INSIDE)
+    apart, whole = Painted(moved, colors).at(places), Painted(points_of(body), np.full_like(colors, to_rgb(INTERFACE)))
+    view = view_of(whole.at(outer))
     figure, (panels,) = panels_of(1, 2)
-    for panel, title, patches in zip(
-        panels, ("drawn apart", "interfaces"), (apart, [*interfaces, *glass(body)]), strict=True
-    ):
-        show(panel, title, patches, view)
+    show(panels[0], "drawn apart", apart, view)
+    show(panels[1], "interfaces", [*whole.at(glued), *glass(body)], view)
     name_colors(figure, body)
     count = len(body.interfaces)
     joints = f"{count} interface" + ("s" if count != 1 else "")
     return save(figure, path, f"{len(body)} blocks, {joints}; glued faces are light")
 
 
-def _moves(points: Sequence[Array], count: int) -> Array:
-    """Return by how much each block is moved, (count, 3). points: of nine faces and sections a block."""
-    own = [points[PER_PATCH * k : PER_PATCH * (k + 1)] for k in range(count)]
-    middles = np.array([np.mean([where.mean(axis=(0, 1)) for where in parts], axis=0) for parts in own])
-    return np.asarray(APART * (middles - middles.mean(axis=0)))
+def _apart(points: Samples) -> Samples:
+    """Return the points of blocks, each moved away from the middle of all."""
+    middles = points.lattices.mean(axis=(1, 2, 3))
+    moves = APART * (middles - middles.mean(axis=0))
+    planes = points.planes + moves[points.places // PER_PATCH, None, None]
+    return Samples(points.places, planes, points.lattices + moves[:, None, None, None])
 
 
 def draw_folds(path: str | Path | None, body: BodyLike, places: Array) -> Figure:
@@ -157,8 +166,8 @@ def draw_meeting(path: str | Path | None, body: BodyLike, meeting: Meeting) -> F
 
 def glass(body: BodyLike) -> list[Patch]:
     """Return the outer faces as transparent patches."""
-    points = points_of(body).patches
-    return [plain_patch(points[k], "0.6", opacity=0.25) for k in outer_faces(body)]
+    colors = np.full_like(own_colors(body), 0.6)
+    return Painted(points_of(body), colors, opacity=0.25).at(outer_faces(body))
 
 
 PLOTS = {"faces": draw_faces, "lines": draw_lines, "cut": draw_cut, "distortion": draw_distortion}

@@ -11,14 +11,15 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch as Swatch
 
 from parameterize.arrays import Array, IntArray
-from parameterize.spline.body import BodyLike, as_body
-from parameterize.spline.interface import axis_side
+from parameterize.spline.body import Body, BodyLike, as_body
+from parameterize.spline.orientation import orientations
+from parameterize.spline.volume import FACE_NAMES
 from parameterize.surface.geometry import normals_and_areas
 from parameterize.surface.surface import Surface
 from solve.forms.conditions import Condition
-from solve.forms.frame import face_geometry
 from solve.forms.region import Region
 
+from .fields import FEW, LINED, PER_PATCH, maps_of, on_planes, outer_faces, sizes_of, slopes_of
 from .render import Patch
 from .style import panels_of, save, show_around
 
@@ -35,17 +36,43 @@ def draw_conditions(path: str | Path | None, body: BodyLike, conditions: Sequenc
 
     conditions: with their regions placed. Where two meet, the first is shown.
     """
-    palette, rows = _palette(len(conditions)), np.linspace(0.0, 1.0, SAMPLES)
-    patches = []
-    glued = as_body(body)
-    for number, name in glued.outer_faces:
-        x, normal = face_geometry(glued.patches[number], [rows] * 3, *axis_side(name))
-        points = np.asarray(x)
-        units = normal / np.linalg.norm(normal, axis=0)
-        first = _first([condition.region for condition in conditions], points, units, glued.face_name(number, name))
-        patches.append(Patch(np.moveaxis(points, 0, -1), palette[first], every=SAMPLES - 1))
+    palette, glued = _palette(len(conditions)), as_body(body)
+    places = outer_faces(glued)
+    samples = SAMPLES if len(glued) <= FEW else sizes_of(glued)[0]
+    points, normals = on_planes(maps_of(glued), places, samples), _normals(glued, places, samples)
+    first = _first_of_faces([condition.region for condition in conditions], glued, points, normals)
     names = [f"{condition.kind}: {condition.region}" for condition in conditions]
-    return _draw(path, patches, palette, names, "Where data are given")
+    every = samples - 1 if len(glued) <= LINED else 0
+    return _draw(path, [Patch(points, palette[first], every=every)], palette, names, "Where data are given")
+
+
+def _normals(body: Body, places: IntArray, samples: int) -> Array:
+    """Return the outward unit normals (k, samples, samples, 3) of outer faces (k,)."""
+    patches, faces = np.divmod(places, PER_PATCH)
+    slopes = on_planes(slopes_of(body), places, samples)
+    normals, hands = np.empty(slopes.shape[:-1]), np.empty(len(body))
+    for group in body.groups:
+        hands[group.numbers] = orientations(group)
+    for number in range(len(FACE_NAMES)):
+        axis, side = divmod(number, 2)
+        b, c = (slopes[faces == number][..., (axis + step) % 3] for step in (1, 2))
+        normals[faces == number] = np.cross(b, c) if side else np.cross(c, b)
+    return normals * (hands[patches, None, None] / np.linalg.norm(normals, axis=-1))[..., None]
+
+
+def _first_of_faces(regions: Sequence[Region], body: Body, points: Array, normals: Array) -> IntArray:
+    """Return the number (k, m, m) of the first region that holds at points of the outer faces, -1 where none does."""
+    found = np.empty(points.shape[:-1], dtype=np.int64)
+    names, x, n = body.outer_faces, np.moveaxis(points, -1, 0), np.moveaxis(normals, -1, 0)
+    kinds = np.array([face for _, face in names])
+    for face in FACE_NAMES:
+        own = kinds == face
+        found[own] = _first(regions, x[:, own], n[:, own], face)
+    named = {face for region in regions for face in region.patch_faces}
+    for number, (patch, face) in enumerate(names):
+        if (name := body.face_name(patch, face)) in named:
+            found[number] = _first(regions, x[:, number], n[:, number], name)
+    return found
 
 
 def draw_regions(path: str | Path | None, surface: Surface, regions: Sequence[Region]) -> Figure:

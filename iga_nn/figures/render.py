@@ -32,11 +32,11 @@ CANNOT_DRAW = f"VTK cannot draw on this machine; remedy: {REMEDY}"
 
 @dataclass(frozen=True, eq=False)
 class Patch:
-    """Hold a surface patch given by samples on a tensor grid.
+    """Hold a surface patch given by samples on a tensor grid, or k of them.
 
-    points: (m, n, 3). colors: (m, n, 3) red, green, blue in 0..1, shown without shading where `lit` is false.
-    every: samples from one parameter line to the next in both directions; 0 draws none.
-    opacity: below 1 the patch is transparent.
+    points: (m, n, 3), of several (k, m, n, 3). colors: red, green, blue in 0..1 there, shown without shading where
+    `lit` is false. every: samples from one parameter line to the next in both directions; 0 draws none. opacity: below
+    1 the patch is transparent.
     """
 
     points: Array
@@ -99,7 +99,7 @@ def widest_view(points: Array, tilt: float = 0.0) -> View:
 
 
 def plain_patch(points: Array, color: str, **look: Any) -> Patch:
-    """Return a patch in one of matplotlib's colours. points: (m, n, 3)."""
+    """Return a patch in one of matplotlib's colours. points: as in Patch."""
     return Patch(points, np.broadcast_to(to_rgb(color), points.shape), **look)
 
 
@@ -162,10 +162,11 @@ def _mesh(patches: Sequence[Patch]) -> Any:
 
     quads, first = [], 0
     for patch in patches:
-        m, n = patch.points.shape[:2]
-        corner = first + (np.arange(m - 1)[:, None] * n + np.arange(n - 1)).ravel()
+        *_, m, n, _ = patch.points.shape
+        starts = first + np.arange(0, patch.points.size // 3, m * n)
+        corner = (starts[:, None, None] + np.arange(m - 1)[:, None] * n + np.arange(n - 1)).ravel()
         quads.append(np.stack([np.full_like(corner, 4), corner, corner + n, corner + n + 1, corner + 1], axis=1))
-        first += m * n
+        first += patch.points.size // 3
     mesh = pyvista.PolyData(np.concatenate([patch.points.reshape(-1, 3) for patch in patches]), np.concatenate(quads))
     flat = np.concatenate([patch.colors.reshape(-1, 3) for patch in patches])
     mesh["rgb"] = np.round(255.0 * flat).astype(np.uint8)
@@ -176,16 +177,24 @@ def _add_lines(plotter: Any, patches: Sequence[Patch], shift: Array) -> None:
     """Draw the parameter lines of the patches, moved by `shift`."""
     import pyvista
 
-    drawn = []
+    drawn = []  # lines of equally many points, (k, m, 3)
     for patch in patches:
-        if patch.every:  # first the lines of constant first parameter, (k, 3) each
-            drawn += [*patch.points[:: patch.every], *patch.points.transpose(1, 0, 2)[:: patch.every]]
+        if patch.every:
+            for points in (patch.points, patch.points.swapaxes(-3, -2)):  # first the lines of constant first parameter
+                drawn.append(points[..., :: patch.every, :, :].reshape(-1, *points.shape[-2:]))
     if not drawn:
         return
-    starts = np.cumsum([0, *map(len, drawn)])
-    cells = [np.r_[len(row), np.arange(start, start + len(row))] for row, start in zip(drawn, starts, strict=False)]
+    starts = np.cumsum([0, *(rows.size // 3 for rows in drawn)])
+    cells = [_cells(rows, start) for rows, start in zip(drawn, starts, strict=False)]
+    drawn = [rows.reshape(-1, 3) for rows in drawn]
     lines = pyvista.PolyData(np.concatenate(drawn) + shift, lines=np.concatenate(cells))
     plotter.add_mesh(lines, color="black", line_width=LINE_WIDTH, lighting=False)
+
+
+def _cells(rows: Array, start: int) -> NDArray[np.int64]:
+    """Return lines (k, m, 3) as VTK lists cells: the number of points before each. start: the first point's number."""
+    numbers = start + np.arange(rows.size // 3).reshape(rows.shape[:2])
+    return np.insert(numbers, 0, rows.shape[1], axis=1).ravel()
 
 
 def _aim(plotter: Any, points: Array, view: View, pixels: tuple[int, int]) -> None:

@@ -1,6 +1,5 @@
 """Draws a solution, its error and shapes of vibrations: on the boundary, in the body cut open, and inside."""
 
-from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -8,8 +7,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from parameterize.arrays import Array
-from parameterize.spline.body import BodyLike, as_body, size_of
+from parameterize.spline.body import BodyLike, as_body
 from solve import Modes, Solution
 from solve.field import FieldOnBody
 from solve.forms.boundary_value_problem import BoundaryValueProblem
@@ -17,19 +15,21 @@ from solve.forms.boundary_value_problem import BoundaryValueProblem
 from ..level_table import EXACT_ERRORS, TITLES
 from ..options import NO_UNITS, Units
 from .colors import ColorRange, with_unit
-from .cutaway import colored, cut_of, visible
+from .cutaway import Painted, cut_of, visible
 from .fields import (
     ColoredField,
     Samples,
-    all_grids,
     error_of,
     fields_of,
-    flat,
+    lines_of,
+    maps_of,
+    on_planes,
     outer_faces,
     points_of,
-    points_on,
+    sizes_of,
     solution_of,
     vectors_of,
+    vectors_on,
     warp_of,
 )
 from .render import Patch, check_drawable, view_of
@@ -53,10 +53,10 @@ def draw_error(
     """
     field, points = error_of(body, solution, problem), points_of(body)
     figure, rows = panels_of(2, 3)
-    patches = colored(points.patches, field, every=len(points.patches[0]) - 1)
-    show_around(rows[0][:2], [patches[k] for k in outer_faces(body)])
+    painted = Painted(points, field, lines_of(body, 1))
+    show_around(rows[0][:2], painted.at(outer_faces(body)))
     _write_numbers(rows[0][2], solution)
-    show_inside(rows[1], body, points, patches)
+    show_inside(rows[1], body, points, painted)
     color_bar(figure, rows, field.limits, with_unit(r"$|u - u_h|$", units.displacement))
     where = "on the mid-sections" if as_body(body).is_single else "inside"
     return save(figure, path, f"Error on the boundary and {where}")
@@ -70,7 +70,7 @@ def draw_solution(path: str | Path | None, body: BodyLike, solution: FieldOnBody
     field, points = fields_of(solution)[0], points_of(body)
     label = field.titled(units)
     if not (factor := warp_of(solution, points.diagonal)):
-        return _draw_values(path, body, points.patches, field, label)
+        return _draw_values(path, body, points, field, label)
     largest = max(float(values.max()) for values in solution_of(solution).everywhere)
     most = with_unit(f"at most {largest:.3g}", units.displacement)
     title = f"The deformed body: displacements, {most}, are drawn {factor_in_words(factor)} times as large"
@@ -91,30 +91,30 @@ def draw_values(
     The colours range over the whole solid. exaggerate: draw the body displaced by that many times u_h, a vector.
     """
     points = points_of(body)
-    moved = points.patches if exaggerate is None else moved_by(points, solution, exaggerate)
+    moved = points if exaggerate is None else moved_by(points, solution, exaggerate)
     return _draw_values(path, body, moved, solution_of(solution), title)
 
 
-def moved_by(points: Samples, solution: FieldOnBody, factor: float) -> list[Array]:
-    """Return the patches of points, displaced by a factor times the solution."""
-    return [where + factor * by for where, by in zip(points.patches, vectors_of(solution).patches, strict=True)]
+def moved_by(points: Samples, solution: FieldOnBody, factor: float) -> Samples:
+    """Return points, displaced by a factor times the solution."""
+    by = vectors_of(solution)
+    return Samples(points.places, points.planes + factor * by.planes, points.lattices + factor * by.lattices)
 
 
 def _draw_values(
-    path: str | Path | None, body: BodyLike, points: Sequence[Array], field: ColoredField, label: str, heading: str = ""
+    path: str | Path | None, body: BodyLike, points: Samples, field: ColoredField, label: str, heading: str = ""
 ) -> Figure:
-    """Draw a field on the faces and sections of all patches at points (m, m, 3).
+    """Draw a field on the faces and sections of all patches at points.
 
     label: of the colour bar. heading: of the figure.
     """
-    patches, at_rest = colored(points, field, every=len(points[0]) - 1), points_of(body)  # lines along the borders
+    painted, at_rest = Painted(points, field, lines_of(body, 1)), points_of(body)  # lines along the borders
     figure, rows = panels_of(2, 3)
-    faces = [patches[k] for k in outer_faces(body)]
-    show_around(rows[0][:2], faces)
-    left_out, view = cut_of(body, faces, at_rest)
-    halved = [replace(patch, every=len(patch.points) // 2) for patch in patches]  # lines along the cut, too
+    show_around(rows[0][:2], painted.at(outer_faces(body)))
+    left_out, view = cut_of(body, points, at_rest)
+    halved = replace(painted, lines=lines_of(body, 2))  # lines along the cut, too
     show(rows[0][2], "cut open", visible(body, halved, left_out), view)
-    show_inside(rows[1], body, at_rest, patches)
+    show_inside(rows[1], body, at_rest, painted)
     color_bar(figure, rows, field.limits, label)
     return save(figure, path, heading)
 
@@ -123,20 +123,14 @@ def draw_modes(path: str | Path | None, body: BodyLike, modes: Modes) -> Figure:
     """Draw the first modes, displacements, and their frequencies; the size of each is free, and the same in all."""
     shown = list(zip(modes.frequencies, modes.shapes, strict=True))[:MOST]
     figure, axes = panels_of(-(-len(shown) // COLUMNS), min(COLUMNS, len(shown)))
-    volumes, grids = as_body(body).patches, all_grids(MODE_SAMPLES)
-    size = size_of(volumes)
-    faces = [(k // len(grids), grids[k % len(grids)]) for k in outer_faces(body)]
-    still = [points_on(volumes[number], grid) for number, grid in faces]
+    places, samples = outer_faces(body), min(MODE_SAMPLES, sizes_of(body)[0])
+    size, still = as_body(body).size, on_planes(maps_of(body), places, samples)
     for panel, (frequency, shape) in zip(axes.flat, shown, strict=False):
-        moved = [shape.patches[number].grid(*grid) for number, grid in faces]
-        far = [flat(np.linalg.norm(by, axis=-1)) for by in moved]
-        largest = max(float(values.max()) for values in far)
-        limits = ColorRange(0.0, largest)
-        patches = [
-            Patch(points + SWING * size / largest * flat(by), limits.colors(values), every=MODE_SAMPLES - 1)
-            for points, by, values in zip(still, moved, far, strict=True)
-        ]
-        show(panel, f"{frequency:.4g} Hz", patches, view_of(patches))
+        moved = on_planes(vectors_on(shape), places, samples)
+        far = np.linalg.norm(moved, axis=-1)
+        limits = ColorRange(0.0, float(far.max()))
+        patch = Patch(still + SWING * size / limits.high * moved, limits.colors(far), every=samples - 1)
+        show(panel, f"{frequency:.4g} Hz", [patch], view_of([patch]))
     return save(figure, path, "The lowest modes, coloured by their displacement")
 
 

@@ -16,9 +16,10 @@ from numpy.typing import NDArray
 from parameterize.arrays import Array
 from parameterize.files import replacing
 from parameterize.spline.body import BodyLike, as_body
+from parameterize.spline.volume import FACE_NAMES
 
 from .colors import MAP, ColorRange, color_labels
-from .cutaway import beyond, visible
+from .cutaway import Painted, beyond, visible
 from .fields import SECTIONS, Samples
 from .render import NAMELESS, Patch, View, draw, view_of, widest_view
 
@@ -74,19 +75,20 @@ def show_around(
         show(panel, title, patches, direction, marks, names)
 
 
-def show_inside(panels: Any, body: BodyLike, points: Samples, patches: Sequence[Patch]) -> None:
-    """Draw the nine patches of each patch of a body on three panels. points: of the body at rest.
+def show_inside(panels: Any, body: BodyLike, points: Samples, painted: Painted) -> None:
+    """Draw the inside of a body on three panels. points: of the body at rest.
 
     Of a volume these are its mid-sections, without shading, as the reader sees most of each. Several patches are drawn
     without the octants on the far side of x, of y and of z, as one sees them from there.
     """
     if as_body(body).is_single:
-        for panel, title, patch in zip(panels, SECTIONS, patches[6:], strict=True):
+        for number, (panel, title) in enumerate(zip(panels, SECTIONS, strict=True)):
+            (patch,) = painted.at(np.array([len(FACE_NAMES) + number]))
             flat = Patch(patch.points, patch.colors, lit=False)
             show(panel, title, [flat], widest_view(patch.points.reshape(-1, 3)))
         return
     for panel, name, towards in zip(panels, "xyz", np.eye(3), strict=True):
-        show(panel, f"cut across {name}", visible(body, patches, beyond(points, towards)), _alignment(towards))
+        show(panel, f"cut across {name}", visible(body, painted, beyond(points, towards)), _alignment(towards))
 
 
 def _alignment(direction: Array) -> View:
@@ -102,6 +104,8 @@ def _alignment(direction: Array) -> View:
 def name_colors(figure: Figure, body: BodyLike) -> None:
     """Write the legend of the colours of a volume's faces, or of several patches, below the panels."""
     swatches = [Swatch(color=color, label=label) for color, label in color_labels(body)]
+    if not swatches:
+        return
     figure.legend(
         handles=swatches,
         loc="outside lower center",

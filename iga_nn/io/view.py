@@ -11,29 +11,31 @@ change places. The cells of several patches are in one grid, a block of cells af
 from __future__ import annotations
 
 import logging
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from html import escape
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from parameterize.arrays import Array
+from parameterize.arrays import Array, IntArray
 from parameterize.files import replacing, save_text
 from parameterize.spline.body import BodyLike, as_body
 from parameterize.spline.bspline import divided_spans
-from parameterize.spline.orientation import orientation
-from parameterize.spline.volume import BSplineVolume
-from solve.field import FieldOnBody, Points, SplineField
+from parameterize.spline.orientation import orientations
+from parameterize.spline.spline_stack import SplineStack
+from solve.field import FieldOnBody
+from solve.field_groups import FieldGroup, groups_of
 from solve.forms.boundary_value_problem import BoundaryValueProblem
-from solve.forms.form import Quantity
-from solve.quantities import on_grid
+from solve.forms.form import Form, Quantity
+from solve.quantities import group_values, quantity_of
 from solve.solution import Solution
 
 from ..errors import InputError, one_line
 from ..figures.fields import OnGrid, arap_of, error_at, problems_on
-from .vtk import bezier_cells, breaks_of, save
+from .vtk import bezier_cells, save
 
 if TYPE_CHECKING:
     import pyvista
@@ -46,6 +48,8 @@ Rows = Sequence[Array]  # of parameters, a direction each
 SAMPLES = 3  # cells a span and direction, where they are not too many
 MOST_VIEWED = 2**20  # points of a view
 MOST_KEPT = 220_000  # points of solution.vtu, each some 70 bytes with a displacement and its stress
+CORNERS = ((0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1))  # as VTK counts
+BACKWARDS = (4, 5, 6, 7, 0, 1, 2, 3)  # bottom and top change places
 TENSOR = {"XX": (0, 0), "YY": (1, 1), "ZZ": (2, 2), "XY": (0, 1), "YZ": (1, 2), "XZ": (0, 2)}  # in the order of VTK
 
 
@@ -69,16 +73,10 @@ def write_solution(path: Path, solution: Solution) -> int:
     direction: more than one where the file would be large.
     """
     parts = _parts(solution.body, solution, solution.problem)
-    grids, most = [], 1
-    for part in parts:
-        rows, spans = _fitting(breaks_of(part.volume, part.solution), MOST_KEPT // len(parts))
-        fields = _of(part, rows, None)
-        grid = _sampled(part.volume, rows, {name: values.astype(np.float32) for name, values in fields.items()})
-        grid.points = grid.points.astype(np.float32)
-        grids.append(grid)
-        most = max(most, spans)
-    save(path, _joined(solution.body, grids))
-    return most
+    fitted = [_fitting(part.breaks, MOST_KEPT // len(solution.body)) for part in parts]
+    lattices = [_sampled(part, rows, _of(part, rows, None)) for part, (rows, _) in zip(parts, fitted, strict=True)]
+    save(path, _joined(solution.body, lattices, np.float32))
+    return max(spans for _, spans in fitted)
 
 
 def grid(
@@ -109,13 +107,13 @@ def _viewed(
     quantities: Quantities | None,
 ) -> pyvista.UnstructuredGrid:
     """Return linear cells, `samples` a span and direction or as many as fit, with the values of map and solution."""
-    parts, grids = _parts(body, solution, problem), []
-    for part in parts:
-        shown = breaks_of(part.volume, part.solution)
-        most = MOST_VIEWED // len(parts)
-        rows = _fitting(shown, most)[0] if samples is None else [divided_spans(row, samples) for row in shown]
-        grids.append(_sampled(part.volume, rows, _of_map(part, rows) | _of(part, rows, quantities)))
-    return _joined(body, grids)
+    lattices, most = [], MOST_VIEWED // len(as_body(body))
+    for part in _parts(body, solution, problem):
+        rows = (
+            _fitting(part.breaks, most)[0] if samples is None else [divided_spans(row, samples) for row in part.breaks]
+        )
+        lattices.append(_sampled(part, rows, _of_map(part, rows) | _of(part, rows, quantities)))
+    return _joined(body, lattices)
 
 
 def write_series(path: Path, times: Sequence[float], fields: Sequence[FieldOnBody], samples: int | None = None) -> None:
@@ -135,35 +133,104 @@ def write_series(path: Path, times: Sequence[float], fields: Sequence[FieldOnBod
     save_text(path, f'<VTKFile type="Collection" version="0.1"><Collection>\n{inside}\n</Collection></VTKFile>\n')
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Part:
-    """Hold a patch of a body, the solution on it, and the problem there, with X, Y, Z measured in the body.
+    """Hold k patches of a body that have equal degrees and knots, the solution on them, and the problem there.
 
-    arap: the function that gives the distortion on a tensor grid.
+    hands: (k,), the orientations. arap: the function that gives the distortion of patches of a map's group on a tensor
+    grid. rows: (k,), the places of the patches in that group. functions: None without a solution; the problem has X, Y,
+    Z measured in the body.
     """
 
-    volume: BSplineVolume
+    numbers: IntArray
+    maps: SplineStack
+    hands: IntArray
     arap: OnGrid
-    solution: SplineField | None
-    problem: BoundaryValueProblem | None
+    rows: IntArray
+    functions: FieldGroup | None = None
+
+    @property
+    def breaks(self) -> list[Array]:
+        """Return the ends of the spans of the solution and the map, in each direction."""
+        shown = [self.maps.knots] if self.functions is None else [self.maps.knots, self.functions.values.knots]
+        return [np.unique(np.concatenate(rows)) for rows in zip(*shown, strict=True)]
 
 
 def _parts(body: BodyLike, solution: FieldOnBody | None, problem: BoundaryValueProblem | None) -> list[_Part]:
-    volumes = as_body(body).patches
-    fields = [None] * len(volumes) if solution is None else solution.patches
-    problems = [None] * len(volumes) if problem is None else problems_on(problem, body)
-    return [_Part(*part) for part in zip(volumes, arap_of(body), fields, problems, strict=True)]
+    glued = as_body(body)
+    known = list(zip(glued.groups, arap_of(glued), strict=True))
+    parts = [
+        _Part(group.numbers, group.stack, orientations(group), arap, np.arange(len(group)))
+        for group, (_, arap) in known
+    ]
+    if solution is None:
+        return parts
+    problems = () if problem is None else problems_on(problem, glued)
+    return [
+        _with_functions(next(part for part in parts if own.numbers[0] in part.numbers), own)
+        for own in groups_of(solution, glued, problems)
+    ]
 
 
-def _joined(body: BodyLike, grids: Sequence[pyvista.UnstructuredGrid]) -> pyvista.UnstructuredGrid:
-    """Return the grids of all patches as one, with the number of each cell's patch."""
-    if as_body(body).is_single:
-        return grids[0]
+def _with_functions(part: _Part, functions: FieldGroup) -> _Part:
+    """Return the patches of a part that have these functions."""
+    rows = np.searchsorted(part.numbers, functions.numbers)
+    return replace(
+        part, numbers=functions.numbers, maps=functions.maps, hands=part.hands[rows], rows=rows, functions=functions
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Lattice:
+    """Hold samples of k patches: points (k, n_u, n_v, n_w, 3), fields (k, n_u, n_v, n_w, ...) by name."""
+
+    part: _Part
+    points: Array
+    fields: Mapping[str, Array]
+
+    @property
+    def cells(self) -> IntArray:
+        """Return the numbers (k, cells, 8) of the corners of all hexahedra; cells count u fastest."""
+        shape = self.points.shape[3:0:-1]  # of the points, which count u fastest, too
+        numbers = np.arange(math.prod(shape)).reshape(shape)
+        corners = [numbers[_ends(c), _ends(b), _ends(a)].ravel() for a, b, c in CORNERS]
+        first = numbers.size * np.arange(len(self.points))
+        cells = first[:, None, None] + np.stack(corners, axis=1)
+        cells[self.part.hands < 0] = cells[self.part.hands < 0][..., BACKWARDS]
+        return cells
+
+
+def _ends(side: int) -> slice:
+    return slice(1, None) if side else slice(None, -1)
+
+
+def _joined(
+    body: BodyLike, lattices: Sequence[_Lattice], kind: type[np.floating[Any]] = np.float64
+) -> pyvista.UnstructuredGrid:
+    """Return the samples of all patches as one grid, of several with the number of each cell's patch."""
     import pyvista
 
-    for number, grid in enumerate(grids):
-        grid.cell_data["patch"] = np.full(grid.n_cells, number)
-    return pyvista.merge(grids, merge_points=False) if len(grids) > 1 else grids[0]
+    cells, owners, start = [], [], 0
+    for lattice in lattices:
+        own = lattice.cells
+        cells.append(start + own.reshape(-1, 8))
+        owners.append(np.repeat(lattice.part.numbers, own.shape[1]))
+        start += lattice.points.size // 3
+    points = np.concatenate([_flat(lattice.points) for lattice in lattices]).astype(kind)
+    grid = pyvista.UnstructuredGrid({pyvista.CellType.HEXAHEDRON: np.concatenate(cells)}, points)
+    if not as_body(body).is_single:
+        grid.cell_data["patch"] = np.concatenate(owners)
+    for name in lattices[0].fields:
+        columns, components = _as_columns(np.concatenate([_flat(lattice.fields[name]) for lattice in lattices]))
+        grid.point_data[name] = columns.astype(kind)
+        for number, component in enumerate(components):
+            grid.GetPointData().GetArray(name).SetComponentName(number, component)
+    return grid
+
+
+def _flat(values: Array) -> Array:
+    """Return values (k, n_u, n_v, n_w, ...) as (points, ...): VTK counts the first index fastest."""
+    return values.transpose(0, 3, 2, 1, *range(4, values.ndim)).reshape(-1, *values.shape[4:])
 
 
 def _fitting(breaks: Rows, most: int) -> tuple[Rows, int]:
@@ -175,54 +242,44 @@ def _fitting(breaks: Rows, most: int) -> tuple[Rows, int]:
         if np.prod([samples * (len(row) - 1) + 1.0 for row in breaks]) <= most:
             return [divided_spans(row, samples) for row in breaks], 1
     spans, rows = 1, breaks
-    while np.prod([float(len(row)) for row in rows]) > most:
+    while np.prod([float(len(row)) for row in rows]) > most and max(map(len, rows)) > 2:
         spans += 1
         rows = [np.append(row[:-1:spans], row[-1]) for row in breaks]
     return rows, spans
 
 
-def _sampled(volume: BSplineVolume, rows: Rows, fields: Mapping[str, Array]) -> pyvista.UnstructuredGrid:
-    """Return the linear cells between parameters, with fields (n_u, n_v, n_w, ...) as their point data."""
-    import pyvista
-
+def _sampled(part: _Part, rows: Rows, fields: Mapping[str, Array]) -> _Lattice:
+    """Return the samples at parameters, with fields (k, n_u, n_v, n_w, ...)."""
     u, v, w = rows
-    grid = pyvista.StructuredGrid(*np.moveaxis(volume.grid(u, v, w), -1, 0)).cast_to_unstructured_grid()
-    if orientation(volume) < 0:  # bottom and top of each cell change places
-        grid.cells = grid.cells.reshape(-1, 9)[:, [0, 5, 6, 7, 8, 1, 2, 3, 4]].ravel()
-    for name, values in fields.items():
-        columns, components = _as_columns(values)
-        grid.point_data[name] = columns
-        for number, component in enumerate(components):
-            grid.GetPointData().GetArray(name).SetComponentName(number, component)
-    return grid
+    return _Lattice(part, part.maps.grid(u, v, w), fields)
 
 
 def _of_map(part: _Part, rows: Rows) -> dict[str, Array]:
     u, v, w = rows
-    return {"arap": part.arap(u, v, w), "det J": np.linalg.det(part.volume.grid_jacobian(u, v, w))}
+    return {"arap": part.arap(part.rows, u, v, w), "det J": np.linalg.det(part.maps.grid_slopes(u, v, w))}
 
 
 def _of(part: _Part, rows: Rows, quantities: Quantities | None) -> dict[str, Array]:
-    """Return a solution on a grid of a patch, its error where the exact solution is known, and quantities of its law.
+    """Return a solution on a grid of patches, its error where the exact solution is known, and quantities of its law.
 
     Raises InputError for quantities without a law, and for names that it does not give.
     """
-    volume, solution, problem = part.volume, part.solution, part.problem
-    if (solution is None or problem is None) and quantities:
+    functions = part.functions
+    if (functions is None or functions.problem is None) and quantities:
         raise InputError("quantities need a solution whose law is known, by the report.json beside it")
-    if solution is None:
+    if functions is None:
         return {}
     u, v, w = rows
-    fields = {"u": solution.grid(u, v, w)}
-    if problem is None:
+    values = functions.values.grid(u, v, w)
+    fields = {"u": values[..., 0] if values.shape[-1] == 1 else values}
+    if (problem := functions.problem) is None:
         return fields
     if problem.exact is not None:
-        fields["error"] = error_at(fields["u"], problem, Points.on(volume, u, v, w))
+        fields["error"] = error_at(fields["u"], problem, functions.points_on(u, v, w))
     chosen = _default(problem.form.quantities) if quantities is None else quantities
     asked = chosen if isinstance(chosen, Mapping) else {name: name for name in chosen}
-    field = replace(solution, geometry=volume)
     try:
-        return fields | {name: on_grid(field, problem.form, what, u, v, w) for name, what in asked.items()}
+        return fields | {name: _quantity(functions, problem.form, what, rows) for name, what in asked.items()}
     except ValueError as error:
         if quantities is not None:
             raise InputError(one_line(error)) from None
@@ -230,17 +287,22 @@ def _of(part: _Part, rows: Rows, quantities: Quantities | None) -> dict[str, Arr
         return fields
 
 
+def _quantity(functions: FieldGroup, form: Form, what: str | Quantity, rows: Rows) -> Array:
+    """Return a quantity (k, n_u, n_v, n_w, ...) on a grid of patches."""
+    u, v, w = rows
+    return np.moveaxis(group_values(functions, quantity_of(form, what), u, v, w), (-4, -3, -2, -1), (0, 1, 2, 3))
+
+
 def _default(given: Mapping[str, Quantity]) -> tuple[str, ...]:
     """Return the quantities in a file of a law with these quantities."""
     return ("stress", "von_mises") if "stress" in given else ("gradient", "flux")
 
 
-def _as_columns(values: Array) -> tuple[Array, Sequence[str]]:
-    """Return values (n_u, n_v, n_w, ...) as numbers (points,), vectors or tensors (points, k), and names of the latter.
+def _as_columns(flat: Array) -> tuple[Array, Sequence[str]]:
+    """Return values (points, ...) as numbers (points,), vectors or tensors (points, k), and names of the latter.
 
     A symmetric tensor has the six components of TENSOR, another one its nine, row by row.
     """
-    flat = values.reshape((-1, *values.shape[3:]), order="F")  # VTK counts the first index fastest
     if flat.shape[1:] == (3, 3) and np.allclose(flat, np.swapaxes(flat, 1, 2), rtol=0.0, atol=1e-12 * np.ptp(flat)):
         return np.stack([flat[:, i, j] for i, j in TENSOR.values()], axis=1), tuple(TENSOR)
     columns = flat.reshape(len(flat), -1)

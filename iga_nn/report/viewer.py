@@ -18,7 +18,7 @@ import numpy as np
 from matplotlib import colormaps
 from numpy.typing import NDArray
 
-from parameterize.arrays import Array, Knots, Mask
+from parameterize.arrays import Array, IntArray, Knots, Mask
 from parameterize.spline.body import BodyLike, as_body
 from parameterize.spline.bspline import breakpoints
 from parameterize.spline.volume import AXES, FACE_NAMES
@@ -27,9 +27,8 @@ from solve.forms.boundary_value_problem import BoundaryValueProblem
 from solve.forms.form import Quantity
 
 from ..figures.colors import MAP, color_labels, even_range, face_colors, face_labels
-from ..figures.cutaway import cut_of, patches_of, seen_quarters
+from ..figures.cutaway import WITH_OCTANTS, cut_of, seen_quarters
 from ..figures.fields import (
-    MANY,
     PER_PATCH,
     PLANES,
     ColoredField,
@@ -154,14 +153,14 @@ def scene_of_frames(
     return _scene(body, alike, coarser=2) | {"warp": factor, "oscillates": oscillates}
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Drawn:
     """Say which samples of a body the page has: those on some faces, and in the lattices, every second for `coarser` 2.
 
     faces: the places of the outer faces among the nine faces and sections of each patch.
     """
 
-    faces: Sequence[int]
+    faces: IntArray
     coarser: int
 
     def thinned(self, samples: Samples) -> tuple[Array, Array]:
@@ -170,8 +169,7 @@ class Drawn:
         With `coarser` 2 both have half as many points a direction.
         """
         step, twice = slice(None, None, self.coarser), slice(None, None, 2 * self.coarser)
-        faces = np.stack([samples.patches[k][twice, twice] for k in self.faces])
-        return faces, np.stack([lattice[step, step, step] for lattice in samples.lattices])
+        return samples.on(self.faces)[:, twice, twice], samples.lattices[:, step, step, step]
 
     def packed(self, samples: Samples, shares: Callable[[Array], Array]) -> dict[str, str]:
         """Return the packed shares of samples, on the faces and in the lattices."""
@@ -179,27 +177,37 @@ class Drawn:
         return {"faces": _packed(shares(faces)), "lattice": _packed(shares(lattices))}
 
 
+def _coarser(points: Samples, wanted: int) -> int:
+    """Return the step in which samples are taken: the wanted one where what is left has the planes of a body cut open.
+
+    Lattices without octants need their ends alone.
+    """
+    rows = points.lattices.shape[1] - 1, (points.planes.shape[1] - 1) // 2
+    parts = 2 * wanted if points.lattices.shape[1] >= WITH_OCTANTS else wanted
+    return 1 if any(row % parts for row in rows) else wanted
+
+
 def _scene(body: BodyLike, frames: Sequence[Frame], coarser: int) -> Scene:
     """Return a scene of frames with the same fields; the distortion of the body joins the first frame's fields."""
     points, patches = points_of(body), as_body(body).patches
-    drawn = Drawn(outer_faces(body), coarser if len(patches) <= MANY else 1)  # many have few samples already
+    drawn = Drawn(outer_faces(body), _coarser(points, coarser))
     low, high = points.cloud.min(axis=0), points.cloud.max(axis=0)
-    images = patches_of(body, points.patches)
-    left_out, view = cut_of(body, [images[k] for k in drawn.faces], points)
+    left_out, view = cut_of(body, points, points)
     count, many = (part.shape[1] for part in drawn.thinned(points))
     whole = [replace(frames[0], fields=[*frames[0].fields, distortion_of(body)]), *frames[1:]]
     bound = _bound(frames)
-    knots = frames[0].knots or [patch.knots for patch in patches]
+    spans, meshes = _meshes(frames[0].knots or [patch.knots for patch in patches])
     return {
         "samples": {"faces": count, "lattice": many},  # per direction
         "low": low.tolist(),
         "high": high.tolist(),
         "view": np.stack([view.right, view.up, view.towards]).tolist(),
-        "outer": [divmod(k, PER_PATCH) for k in drawn.faces],  # patch and face
-        "cut": _cut(list(seen_quarters(body, left_out)), drawn.faces),
+        "outer": np.stack(np.divmod(drawn.faces, PER_PATCH), axis=1).tolist(),  # patch and face
+        "cut": _cut(seen_quarters(body, left_out), drawn.faces),
         "places": drawn.packed(points, lambda where: (where - low) / np.where(high > low, high - low, 1.0)),
         "axes": list(AXES) if as_body(body).is_single else [],  # along which there are sections through the cube
-        "spans": [[breakpoints(row).tolist() for row in rows] for rows in knots],
+        "spans": spans,
+        "meshes": meshes,  # of each patch the number of its entry in `spans`
         **_colors(body, drawn.faces),
         "map": _packed(colormaps[MAP](np.arange(256))[:, :3], np.uint8),  # (256, 3)
         "fields": [_described(field, frames[0]) for field in whole[0].fields],
@@ -211,35 +219,37 @@ def _scene(body: BodyLike, frames: Sequence[Frame], coarser: int) -> Scene:
     }
 
 
-def _cut(seen: Sequence[Mask], outer: Sequence[int]) -> dict[str, list[tuple[float, ...]]]:
+def _meshes(knots: Sequence[Knots]) -> tuple[list[list[list[float]]], list[int]]:
+    """Return the ends of the spans of the different meshes, in each direction, and the number of each patch's mesh."""
+    numbers: dict[Any, int] = {}
+    meshes = [numbers.setdefault(tuple(row.tobytes() for row in rows), len(numbers)) for rows in knots]
+    _, first = np.unique(meshes, return_index=True)
+    return [[breakpoints(row).tolist() for row in knots[patch]] for patch in first.tolist()], meshes
+
+
+def _cut(seen: Mask, outer: IntArray) -> dict[str, list[tuple[float, ...]]]:
     """Return what is seen of a body cut open.
 
     These are outer faces by their numbers, with their quarters (`_bits`); and planes inside: patch, direction, its
     parameter, and quarters. Glued faces are such planes, too.
     """
-    faces = [(number, _bits(seen[k // PER_PATCH][k % PER_PATCH])) for number, k in enumerate(outer)]
-    inside = [(i, k) for i in range(len(seen)) for k in range(PER_PATCH) if PER_PATCH * i + k not in set(outer)]
-    planes = [(i, *PLANES[k], _bits(seen[i][k])) for i, k in inside]
-    return {"faces": [row for row in faces if row[-1]], "planes": [row for row in planes if row[-1]]}
+    bits = (seen.reshape(-1, 4) @ (1 << np.arange(4))).astype(int)  # the quarter (i, j) is bit 2 i + j
+    faces = [(number, quarters) for number, quarters in enumerate(bits[outer].tolist()) if quarters]
+    inside = np.setdiff1d(np.flatnonzero(bits), outer)
+    planes = [
+        (k // PER_PATCH, *PLANES[k % PER_PATCH], quarters)
+        for k, quarters in zip(inside.tolist(), bits[inside].tolist(), strict=True)
+    ]
+    return {"faces": faces, "planes": planes}
 
 
-def _bits(quarters: Mask) -> int:
-    """Return the quarters (2, 2) of a face as bits of a number, (i, j) as bit 2 i + j."""
-    return int(quarters.ravel() @ (1 << np.arange(4)))
-
-
-def _colors(body: BodyLike, outer: Sequence[int]) -> dict[str, Any]:
+def _colors(body: BodyLike, outer: IntArray) -> dict[str, Any]:
     """Return the colours and the names of the outer faces, and the legend of the colours."""
-    colors, labels = np.reshape(face_colors(body), (-1, len(FACE_NAMES))), face_labels()
-    glued = as_body(body)
-    if not glued.is_single:
-        labels = [glued.face_name(i, name) for i in range(len(glued)) for name in FACE_NAMES]
-    named = np.reshape(labels, (-1, len(FACE_NAMES)))
-    return {
-        "colors": [str(colors[divmod(k, PER_PATCH)]) for k in outer],
-        "labels": [str(named[divmod(k, PER_PATCH)]) for k in outer],
-        "legend": color_labels(body),
-    }
+    colors, glued = np.reshape(face_colors(body), (-1, len(FACE_NAMES))), as_body(body)
+    patches, faces = np.divmod(outer, PER_PATCH)
+    pairs = zip(patches.tolist(), faces.tolist(), strict=True)
+    named = face_labels() if glued.is_single else [glued.face_name(patch, FACE_NAMES[face]) for patch, face in pairs]
+    return {"colors": colors[patches, faces].tolist(), "labels": named, "legend": color_labels(body)}
 
 
 def _bound(frames: Sequence[Frame]) -> float:
@@ -248,7 +258,7 @@ def _bound(frames: Sequence[Frame]) -> float:
     return max((float(np.abs(values).max()) for values in parts), default=0.0) or 1.0
 
 
-def _opening(frame: Frame, outer: Sequence[int]) -> dict[str, str]:
+def _opening(frame: Frame, outer: IntArray) -> dict[str, str]:
     """Return the first view: the first field, on the boundary, unless half of the boundary has nearly one value.
 
     A body is seen as a whole, because its shape is more informative than the colours inside.
@@ -256,7 +266,7 @@ def _opening(frame: Frame, outer: Sequence[int]) -> dict[str, str]:
     if not frame.fields:
         return {"field": "faces", "part": "surface"}
     field = frame.fields[0]
-    quarters = np.percentile([field.limits.shares(field.patches[k]) for k in outer], [25.0, 75.0])
+    quarters = np.percentile(field.limits.shares(field.on(outer)), [25.0, 75.0])
     is_even = quarters[1] - quarters[0] < EVEN and not field.limits.remark
     return {"field": field.name, "part": "cut" if is_even and not frame.displaces else "surface"}
 

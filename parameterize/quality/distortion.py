@@ -10,10 +10,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays import Array
+from ..arrays import Array, IntArray
 from ..spline.body import BodyLike, as_body
 from ..spline.bspline import gauss_points
-from ..spline.orientation import mirrored, orientation, orientations
+from ..spline.orientation import orientation, orientations
 from ..spline.patch_groups import PatchGroup, group_of
 from ..spline.volume import BSplineVolume
 from .rotations import closest_rotations
@@ -149,11 +149,10 @@ def _slabs(group: PatchGroup, rules: Rules) -> Iterator[tuple[tuple[slice, slice
     step = max(1, _SLAB_POINTS // (len(v) * len(w)))
     for begin, part in zip(range(0, len(group), together), group.divided(together), strict=True):
         rows = slice(begin, begin + together)
-        signs = orientations(part)[:, None, None, None, None]
+        hands = orientations(part)
         for start in range(0, len(u), step):
             jacobians = part.grid_jacobian(u[start : start + step], v, w)
-            jacobians[..., 0, :] *= signs
-            yield (rows, slice(start, start + step)), jacobians
+            yield (rows, slice(start, start + step)), unmirrored(jacobians, hands)
 
 
 def arap_on(volume: BSplineVolume, u: ArrayLike, v: ArrayLike, w: ArrayLike, box: ArrayLike = 1.0) -> Array:
@@ -161,12 +160,22 @@ def arap_on(volume: BSplineVolume, u: ArrayLike, v: ArrayLike, w: ArrayLike, box
 
     box: its sides (3,), or the length of all three. A left-handed volume is as distorted as its mirror image.
     """
-    return _arap(_unmirrored(volume, u, v, w) / np.asarray(box), (1.0,))[0]
+    jacobians = unmirrored(volume.grid_jacobian(u, v, w)[None], np.array([orientation(volume)]))
+    return in_boxes(jacobians, np.broadcast_to(box, (1, 3)))[0]
 
 
-def _unmirrored(volume: BSplineVolume, u: ArrayLike, v: ArrayLike, w: ArrayLike) -> Array:
-    """Return the Jacobian on a tensor grid, of a left-handed volume that of its mirror image."""
-    return (volume if orientation(volume) > 0 else mirrored(volume)).grid_jacobian(u, v, w)
+def in_boxes(jacobians: Array, boxes: Array) -> Array:
+    """Return the ARAP distortion (k, ...) of maps from boxes with sides (k, 3), of Jacobians (k, ..., 3, 3)."""
+    return _arap(jacobians / boxes.reshape(len(boxes), *(1,) * (jacobians.ndim - 2), 3), (1.0,))[0]
+
+
+def unmirrored(jacobians: Array, hands: IntArray) -> Array:
+    """Return Jacobians (k, ..., 3, 3) of patches with orientations (k,), of left-handed ones of their mirror images.
+
+    The mirror image is that in x, whose det J is the negative of the patch's, exactly. The given array is changed.
+    """
+    jacobians[..., 0, :] *= hands.reshape(-1, *(1,) * (jacobians.ndim - 2))
+    return jacobians
 
 
 def arap(jacobians: ArrayLike) -> Array:

@@ -4,16 +4,16 @@ A hexahedral mesh of thousands of patches is one group, or a few; one cube is a 
 """
 
 from collections import defaultdict
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays import Array, IntArray, Knots, Mask
-from .bspline import evaluate_each, evaluate_grid
-from .rational import Orders, homogeneous, quotients
-from .volume import UNITS, BSplineVolume
+from .rational import Orders, homogeneous
+from .spline_stack import SplineStack
+from .volume import BSplineVolume
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,37 +68,26 @@ class PatchGroup:
         ones = np.ones(self.control_points.shape[:4])
         return homogeneous(self.control_points, ones if self.weights is None else self.weights)
 
+    @property
+    def stack(self) -> SplineStack:
+        """Return the maps as splines without numbers."""
+        return SplineStack(self.degrees, self.knots, self.coefficients, is_rational=self.weights is not None)
+
     def at(self, places: IntArray, parameters: ArrayLike) -> Array:
         """Return F (m, 3) at parameters (m, 3) of the patches at places (m,) of the group."""
-        return self._at(places, parameters, [(0, 0, 0)])[0]
+        return self.stack.at(places, parameters)
 
     def jacobian(self, places: IntArray, parameters: ArrayLike) -> Array:
         """Return J[i, a, b] = dF_a / du_b (m, 3, 3) at parameters (m, 3) of the patches at places (m,)."""
-        return np.stack(self._at(places, parameters, UNITS), axis=-1)
-
-    def _at(self, places: IntArray, parameters: ArrayLike, orders: Sequence[Orders]) -> list[Array]:
-        net = self.coefficients
-        return self._derivatives(
-            lambda order: evaluate_each(self.degrees, self.knots, net, places, parameters, order), orders
-        )
+        return self.stack.slopes_at(places, parameters)
 
     def grid(self, u: ArrayLike, v: ArrayLike, w: ArrayLike, derivative: Orders = (0, 0, 0)) -> Array:
         """Return F or one of its partial derivatives on a tensor grid: (k, len(u), len(v), len(w), 3)."""
-        return self._on_grid((u, v, w), [derivative])[0]
+        return self.stack.on_grid((u, v, w), [derivative])[0]
 
     def grid_jacobian(self, u: ArrayLike, v: ArrayLike, w: ArrayLike) -> Array:
         """Return the Jacobian on a tensor grid: (k, len(u), len(v), len(w), 3, 3), last index the direction."""
-        return np.stack(self._on_grid((u, v, w), UNITS), axis=-1)
-
-    def _on_grid(self, rows: Sequence[ArrayLike], orders: Sequence[Orders]) -> list[Array]:
-        net = np.moveaxis(self.coefficients, 0, 3)
-        return self._derivatives(
-            lambda order: np.moveaxis(evaluate_grid(self.degrees, self.knots, net, rows, order), 3, 0), orders
-        )
-
-    def _derivatives(self, evaluate: Callable[[Orders], Array], orders: Sequence[Orders]) -> list[Array]:
-        """Return partial derivatives of F; evaluate: returns those of the splines of `coefficients`."""
-        return list(map(evaluate, orders)) if self.weights is None else quotients(evaluate, orders)
+        return self.stack.grid_slopes(u, v, w)
 
 
 def group_of(patch: BSplineVolume) -> PatchGroup:

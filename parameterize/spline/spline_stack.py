@@ -2,15 +2,14 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cache, partial
+from functools import partial
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays import Array, IntArray, Knots
-from .bspline import basis_derivatives, evaluate_grid
-from .patch_groups import PatchGroup
-from .rational import Orders, homogeneous, quotients
+from .bspline import evaluate_each, evaluate_grid
+from .rational import Orders, quotients
 from .volume import UNITS
 
 VALUE: Orders = (0, 0, 0)
@@ -37,13 +36,6 @@ class SplineStack:
     coefficients: Array
     is_rational: bool = False
 
-    @classmethod
-    def of_maps(cls, group: PatchGroup) -> "SplineStack":
-        """Return the maps of a group of patches."""
-        if group.weights is None:
-            return cls(group.degrees, group.knots, group.control_points)
-        return cls(group.degrees, group.knots, homogeneous(group.control_points, group.weights), is_rational=True)
-
     def __len__(self) -> int:
         return len(self.coefficients)
 
@@ -51,37 +43,28 @@ class SplineStack:
         """Return some of the splines. rows: their places in the stack."""
         return replace(self, coefficients=self.coefficients[rows])
 
-    def grid(self, u: Array, v: Array, w: Array) -> Array:
+    def grid(self, u: ArrayLike, v: ArrayLike, w: ArrayLike) -> Array:
         """Return the values (k, len(u), len(v), len(w), c) of each spline on a tensor grid of parameters."""
-        return self._on_grid((u, v, w), (VALUE,))[0]
+        return self.on_grid((u, v, w), (VALUE,))[0]
 
-    def grid_slopes(self, u: Array, v: Array, w: Array) -> Array:
+    def grid_slopes(self, u: ArrayLike, v: ArrayLike, w: ArrayLike) -> Array:
         """Return the first derivatives (k, len(u), len(v), len(w), c, 3), the last index the parametric direction."""
-        return np.stack(self._on_grid((u, v, w), UNITS), axis=-1)
+        return np.stack(self.on_grid((u, v, w), UNITS), axis=-1)
 
-    def at(self, owners: IntArray, points: Array) -> tuple[Array, Array]:
-        """Return values (m, c) and first derivatives (m, c, 3) at parameters (m, 3) of the splines `owners` (m,)."""
-        bases = [basis_derivatives(*part, 1) for part in zip(self.knots, self.degrees, points.T, strict=True)]
-        i, j, k = (first[:, None] + np.arange(values.shape[2]) for first, values in bases)
-        owned = owners[:, None, None, None]
-        near = self.coefficients[owned, i[:, :, None, None], j[:, None, :, None], k[:, None, None, :]]
-        (_, u), (_, v), (_, w) = bases
+    def at(self, owners: IntArray, points: ArrayLike) -> Array:
+        """Return the values (m, c) at parameters (m, 3) of the splines `owners` (m,)."""
+        return self._at(owners, points, (VALUE,))[0]
 
-        @cache
-        def along_w(n: int) -> Array:
-            return np.asarray(np.einsum("mk,mijkc->mijc", w[n], near))
+    def slopes_at(self, owners: IntArray, points: ArrayLike) -> Array:
+        """Return the first derivatives (m, c, 3) at parameters (m, 3) of the splines `owners` (m,)."""
+        return np.stack(self._at(owners, points, UNITS), axis=-1)
 
-        @cache
-        def along_vw(order: tuple[int, int]) -> Array:
-            return np.asarray(np.einsum("mj,mijc->mic", v[order[0]], along_w(order[1])))
+    def _at(self, owners: IntArray, points: ArrayLike, orders: Sequence[Orders]) -> list[Array]:
+        evaluate = partial(evaluate_each, self.degrees, self.knots, self.coefficients, owners, points)
+        return self._derivatives(evaluate, orders)
 
-        def derivative(order: Orders) -> Array:
-            return np.asarray(np.einsum("mi,mic->mc", u[order[0]], along_vw(order[1:])))
-
-        value, *slopes = self._derivatives(derivative, (VALUE, *UNITS))
-        return value, np.stack(slopes, axis=-1)
-
-    def _on_grid(self, rows: Sequence[ArrayLike], orders: Sequence[Orders]) -> list[Array]:
+    def on_grid(self, rows: Sequence[ArrayLike], orders: Sequence[Orders]) -> list[Array]:
+        """Return partial derivatives (k, len(u), len(v), len(w), c) on a tensor grid of parameters."""
         net = np.moveaxis(self.coefficients, 0, 3)  # what is evaluated has its three directions first
         evaluate = partial(evaluate_grid, self.degrees, self.knots, net, rows)
         return [np.moveaxis(found, 3, 0) for found in self._derivatives(evaluate, orders)]

@@ -6,28 +6,31 @@ const BINS = 1024;  // of a parameter, in each of which one element line is near
 const LIT = 0, FLAT = 1, FAINT = 2;  // how a plain colour looks
 
 const VERTEX_SHADER = `#version 300 es
-in vec3 place, normal, parameter;
-in float value;
+in vec3 place, normal, parameter, paint;
+in float value, mesh;
 uniform mat3 turn;
 uniform vec2 scale, shift;
 uniform float nearer;
-out vec3 facing, parameters;
+out vec3 facing, parameters, plain;
 out float share;
+flat out int row;
 void main() {
   vec3 seen = turn * place;
   gl_Position = vec4(seen.xy * scale + shift, -0.5 * seen.z - nearer, 1.0);
   parameters = parameter;
   facing = turn * normal;
   share = value;
+  plain = paint;
+  row = int(mesh);
 }`;
 
 const FRAGMENT_SHADER = `#version 300 es
 precision highp float;
-in vec3 facing, parameters;
+in vec3 facing, parameters, plain;
 in float share;
+flat in int row;
 uniform sampler2D map, spans;
-uniform vec3 plain;
-uniform int cube, look;
+uniform int look;
 uniform bool mapped, lined;
 out vec4 color;
 void main() {
@@ -42,7 +45,7 @@ void main() {
   else if (look == ${LIT}) base *= 0.5 + 0.5 * towards;
   if (lined && look != ${FLAT}) {
     vec3 width = fwidth(parameters), nearest;
-    for (int k = 0; k < 3; k++) nearest[k] = texelFetch(spans, ivec2(int(parameters[k] * ${BINS - 1}.0 + 0.5), cube), 0)[k];
+    for (int k = 0; k < 3; k++) nearest[k] = texelFetch(spans, ivec2(int(parameters[k] * ${BINS - 1}.0 + 0.5), row), 0)[k];
     vec3 near = mix(vec3(9.0), abs(parameters - nearest) / max(width, 1e-7), greaterThan(width, vec3(1e-7)));
     base *= 1.0 - 0.45 * (1.0 - smoothstep(0.4, 1.3, min(near.x, min(near.y, near.z))));
   }
@@ -80,10 +83,10 @@ function normals(places, corners) {
   return sums;
 }
 
-// The element line that is nearest to each of some even parameters, of u, v and w, a row for each cube.
+// The element line that is nearest to each of some even parameters, of u, v and w, a row for each mesh.
 function nearestLines(spans) {
   const found = new Float32Array(3 * BINS * spans.length);
-  spans.forEach((cube, row) => cube.forEach((lines, axis) => {
+  spans.forEach((mesh, row) => mesh.forEach((lines, axis) => {
     for (let bin = 0, next = 0; bin < BINS; bin++) {
       const at = bin / (BINS - 1);
       while (next + 1 < lines.length && lines[next + 1] - at < at - lines[next]) next++;
@@ -95,6 +98,37 @@ function nearestLines(spans) {
 
 function rgb(color) {
   return [1, 3, 5].map((at) => parseInt(color.slice(at, at + 2), 16) / 255);
+}
+
+// Arrays of numbers one after another.
+function joined(kind, parts) {
+  const found = new kind(parts.reduce((sum, part) => sum + part.length, 0));
+  let at = 0;
+  for (const part of parts) {
+    found.set(part, at);
+    at += part.length;
+  }
+  return found;
+}
+
+// The numbers of corners of patches, as they are counted once the places of all patches stand one after another.
+function numbered(patches, cornersOf) {
+  const found = joined(Uint32Array, patches.map(cornersOf));
+  let at = 0, first = 0;
+  for (const patch of patches) {
+    const end = at + cornersOf(patch).length;
+    for (; at < end; at++) found[at] += first;
+    first += patch.places.length / 3;
+  }
+  return found;
+}
+
+// The same numbers at each place of a patch.
+function repeated(patches, numbersOf) {
+  return joined(Float32Array, patches.map((patch) => {
+    const numbers = numbersOf(patch), found = new Float32Array(patch.places.length / 3 * numbers.length);
+    return found.map((_, at) => numbers[at % numbers.length]);
+  }));
 }
 
 // Draws a scene on a canvas. `load` takes patches to the graphics card, `draw` shows them.
@@ -135,14 +169,16 @@ class Graphics {
       for (const buffer of buffers) this.gl.deleteBuffer(buffer);
     }
     this.loaded = [
-      ...ghosts.map((patch) => this.#sent(patch, FAINT)),
-      ...patches.map((patch) => this.#sent(patch, LIT, range)),
-      ...outlines.map((patch) => this.#sent({...patch, plain: OUTLINE}, FLAT)),
+      this.#sent(ghosts, FAINT),
+      this.#sent(patches, LIT, range),
+      this.#sent(outlines.map((patch) => ({...patch, plain: OUTLINE})), FLAT),
     ];
   }
 
-  #sent(patch, look, range = null) {
-    const gl = this.gl, array = gl.createVertexArray(), buffers = [], mapped = Boolean(range && patch.values);
+  // Sends patches as one: of thousands, each alone would take its time.
+  #sent(patches, look, range = null) {
+    const gl = this.gl, array = gl.createVertexArray(), buffers = [];
+    const mapped = Boolean(range && patches.length && patches[0].values);
     const buffer = (kind, data) => {
       buffers.push(gl.createBuffer());
       gl.bindBuffer(kind, buffers.at(-1));
@@ -154,15 +190,18 @@ class Graphics {
       gl.enableVertexAttribArray(at);
       gl.vertexAttribPointer(at, size, gl.FLOAT, false, 0, 0);
     };
-    const corners = look === FLAT ? patch.border : patch.corners;
+    const places = joined(Float32Array, patches.map((patch) => patch.places));
+    const corners = numbered(patches, (patch) => look === FLAT ? patch.border : patch.corners);
     gl.bindVertexArray(array);
-    attribute("place", patch.places, 3);
-    attribute("parameter", patch.parameters, 3);
-    if (mapped) attribute("value", Float32Array.from(patch.values, (value) => range.share(value)), 1);
-    if (look !== FLAT) attribute("normal", normals(patch.places, patch.corners), 3);
+    attribute("place", places, 3);
+    attribute("parameter", joined(Float32Array, patches.map((patch) => patch.parameters)), 3);
+    attribute("paint", repeated(patches, (patch) => rgb(patch.plain)), 3);
+    attribute("mesh", repeated(patches, (patch) => [this.scene.meshes[patch.cube]]), 1);
+    if (mapped) attribute("value", Float32Array.from(joined(Float64Array, patches.map((patch) => patch.values)), (value) => range.share(value)), 1);
+    if (look !== FLAT) attribute("normal", normals(places, corners), 3);
     buffer(gl.ELEMENT_ARRAY_BUFFER, corners);
     gl.bindVertexArray(null);
-    return {patch, array, buffers, look, mapped, count: corners.length};
+    return {array, buffers, look, mapped, count: corners.length};
   }
 
   draw(camera, lined) {
@@ -176,12 +215,10 @@ class Graphics {
     gl.uniform2f(this.uniform("shift"), 2 * camera.shift[0] / canvas.clientWidth, -2 * camera.shift[1] / canvas.clientHeight);
     gl.uniformMatrix3fv(this.uniform("turn"), true, camera.view.flat());
     gl.uniform1i(this.uniform("lined"), lined);
-    for (const {patch, array, look, mapped, count} of this.loaded) {
-      gl.uniform3fv(this.uniform("plain"), rgb(patch.plain));
+    for (const {array, look, mapped, count} of this.loaded) {
       gl.uniform1f(this.uniform("nearer"), look === FLAT ? NEARER : 0);
       gl.uniform1i(this.uniform("mapped"), mapped);
       gl.uniform1i(this.uniform("look"), look);
-      gl.uniform1i(this.uniform("cube"), patch.cube);
       (look === FAINT ? gl.enable : gl.disable).call(gl, gl.BLEND);
       gl.depthMask(look !== FAINT);
       gl.bindVertexArray(array);

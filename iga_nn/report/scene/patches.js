@@ -8,6 +8,7 @@ const INSIDE = "#b8bdc7";  // of sections where no field is shown
 const GHOST = "#8b95a1";  // of the rest around a section
 const WHOLE = 15;  // all quarters: the quarter (i, j) of a patch is bit 2 i + j
 const AXES = [0, 1, 2];
+const MOST_OUTLINED = 3000;  // faces: the borders of more would cover the colours
 
 function remembered(make) {
   const known = {};
@@ -108,11 +109,11 @@ function patchesOf(body, part, share) {
     const planes = scene.cut.planes.map(([cube, axis, at, quarters]) => sectionPatch(body, cube, axis, at * last, quarters));
     return {patches: [...faces, ...planes], ghosts: [], outlines: planes};
   }
-  const faces = scene.outer.map((_, face) => facePatch(body, face));
-  if (part === "surface") return {patches: faces, ghosts: [], outlines: body.values ? faces : []};
-  const axis = scene.axes.indexOf(part), cubes = [...scene.spans.keys()];
+  const faces = scene.outer.map((_, face) => facePatch(body, face)), outlines = faces.length > MOST_OUTLINED ? [] : faces;
+  if (part === "surface") return {patches: faces, ghosts: [], outlines: body.values ? outlines : []};
+  const axis = scene.axes.indexOf(part), cubes = [...scene.meshes.keys()];
   const sections = axis < 0 ? cubes.map((cube) => planeSection(body, cube, "xyz".indexOf(part), share))
     : cubes.map((cube) => sectionPatch(body, cube, axis, Math.round(share * last)));
   const patches = sections.filter((patch) => patch.corners.length);
-  return {patches, ghosts: faces.map((patch) => ({...patch, plain: GHOST})), outlines: faces};
+  return {patches, ghosts: faces.map((patch) => ({...patch, plain: GHOST})), outlines};
 }

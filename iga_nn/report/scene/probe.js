@@ -55,7 +55,7 @@ function readings(scene, frame, patch, hit) {
   const {corners, weights} = hit;
   const found = [
     ["x, y, z", pointAt(scene, patch, hit).map(written).join(", ")],
-    ...(scene.spans.length > 1 ? [["patch", `p${patch.cube}`]] : []),
+    ...(scene.meshes.length > 1 ? [["patch", `p${patch.cube}`]] : []),
     ["u, v, w", AXES.map((axis) => mixed(patch.parameters, 3, corners, weights, axis).toFixed(3)).join(", ")],
   ];
   for (const field of scene.fields)
