@@ -1,6 +1,6 @@
-"""The kinds of arrays that most functions take and return, and how a point and a share are written."""
+"""The kinds of arrays that most functions take and return, and how points, shares and long lists are written."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -16,6 +16,12 @@ Knots = tuple[Array, Array, Array]  # the knot vectors of u, v, w
 def in_brackets(point: Iterable[float]) -> str:
     """Return the three coordinates of a point as text: "(0.25, 1, -3.5e-07)"."""
     return "({:.6g}, {:.6g}, {:.6g})".format(*point)
+
+
+def listed(names: Sequence[object], most: int = 5) -> str:
+    """Return names as text, of very many the first ones: "p0, p1, p2, p3, p4 and 7 more"."""
+    rest = len(names) - most
+    return ", ".join(map(str, names[:most])) + (f" and {rest} more" if rest > 0 else "")
 
 
 def in_percent(share: float) -> str:

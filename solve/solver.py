@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from parameterize.arrays import listed
 from parameterize.compilation import compilation_told
 from parameterize.old_names import takes_volume
 from parameterize.spline.body import Body, BodyLike, as_body
@@ -195,7 +196,7 @@ def _demand_known_patches(body: Body, problem: BoundaryValueProblem) -> None:
     """Raise ValueError for data of faces that are not outer faces of the body, and of patches that it does not have."""
     outer = {body.face_name(*face) for face in body.outer_faces}
     if unknown := sorted(problem.patch_faces - outer):
-        faces = "u0 to w1" if body.is_single else ", ".join(sorted(outer))
+        faces = "u0 to w1" if body.is_single else listed(sorted(outer), 12)
         raise ValueError(f"{unknown[0]} is no outer face of the body; its faces are {faces}")
     for name, numbers in problem.by_patch.items() if not body.is_single else ():
         if beyond := sorted(numbers - set(range(len(body))), key=str):

@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 import numpy as np
 from scipy.sparse.linalg import LinearOperator
 
-from parameterize.arrays import Array, Mask
+from parameterize.arrays import Array, Mask, listed
 from parameterize.conjugate_gradients import LinearResult, conjugate_gradients
 from parameterize.spline.body import Body
 from parameterize.spline.bspline import greville
@@ -473,7 +473,7 @@ def _demand_held(
     for numbers in parts:
         part = [here[number] for number in numbers if number in here]
         faces = [face for system in part for face in system.weak]
-        named = ", ".join(f"p{number}" for number in numbers)
+        named = listed([f"p{number}" for number in numbers])
         try:
             if problem.conditions and not processes.total(sum(len(system.space.dirichlet) for system in part)):
                 demand_supports(problem, faces, processes, [body.patches[number] for number in numbers])
@@ -489,7 +489,7 @@ def demand_fixed(part: Sequence[int], free: Mask, processes: Processes) -> None:
     free: which of its patches on this process do.
     """
     if all(processes.shared(bool(free.all()))):
-        named = ", ".join(f"p{number}" for number in part)
+        named = listed([f"p{number}" for number in part])
         raise ValueError(f"nothing fixes the solution on {named}, a part of its own: give it a value, or glue it")
 
 

@@ -3,6 +3,8 @@
 from itertools import zip_longest
 from typing import Any
 
+from parameterize.arrays import listed
+
 from ..batch.table import Batch
 from ..level_table import ESTIMATES, EXACT_ERRORS, TITLES
 from ..report import advice, balance, extremes
@@ -19,6 +21,7 @@ CODES = {  # of a state
     "not solved": NOT_SOLVED,
 }
 SHOWN_ERRORS = (*EXACT_ERRORS, *ESTIMATES)
+MOST_SHOWN = 40  # entries of a list
 
 
 def exit_code(report: reports.Report) -> int:
@@ -74,14 +77,16 @@ def _level(level: dict[str, Any]) -> str:
 
 
 def volume_in_words(facts: reports.Report) -> str:
-    """Return the facts of `check` about a volume as text, the verdicts first."""
+    """Return the facts of `check` about a volume as text, the verdicts first; of many patches the worst."""
     known = ("bijective", "boundary_injective", "patches", "not_the_part", "surface_distance", "volume")
     others = {key: value for key, value in facts.items() if key not in known}
     report = {"parameterization": facts}
     proved = {"NOT THE PART": far} if (far := reports.not_the_part(report)) else {}
     proved |= {reports.claim(report): facts["bijective"], "one-to-one": reports.one_to_one(report)}
-    parts = [f"{f'p{number}:':16s} {_patch(part)}" for number, part in enumerate(facts.get("patches", ()))]
-    return "\n".join([*(f"{name:16s} {text}" for name, text in proved.items()), facts_in_words(others), *parts])
+    parts = [f"{f'{name}:':16s} {_patch(part)}" for name, part in reports.shown_patches(facts)]
+    heading = [] if len(parts) == len(facts.get("patches", ())) else [reports.patches_heading(facts)]
+    verdicts = (f"{name:16s} {text}" for name, text in proved.items())
+    return "\n".join([*verdicts, facts_in_words(others), *heading, *parts])
 
 
 def _patch(part: reports.Report) -> str:
@@ -115,5 +120,5 @@ def _text(value: Any) -> str:
     if isinstance(value, dict):
         return "; ".join(f"{key} {_text(item)}" for key, item in value.items())
     if isinstance(value, list | tuple):
-        return ", ".join(_text(item) for item in value) or "none"
+        return listed([_text(item) for item in value], MOST_SHOWN) or "none"
     return str(value)

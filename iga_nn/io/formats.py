@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 
+from parameterize.arrays import listed
 from parameterize.files import replacing
 from parameterize.spline.body import TOLERANCE, Body, BodyLike, as_body, shared_numbers
 from parameterize.spline.volume import BSplineVolume
@@ -112,9 +113,8 @@ def load_volume(path: str | Path, tolerance: float = TOLERANCE) -> BodyLike:
             raise InputError(f"{source}: is not a spline volume; create one with `iga-nn run poisson {source}`")
         body = read_body(source, kind, tolerance) if kind in FORMATS else Body.load(source)
     if near := body.nearly_glued:
-        pairs = ", ".join(f"{pair} ({distance:.2g} apart)" for pair, distance in near[:SHOWN])
-        more = f" and {len(near) - SHOWN} more" if len(near) > SHOWN else ""
-        log.warning("%s: faces that nearly match are not glued: %s%s; a larger tolerance glues them", path, pairs, more)
+        pairs = listed([f"{pair} ({distance:.2g} apart)" for pair, distance in near], SHOWN)
+        log.warning("%s: faces that nearly match are not glued: %s; a larger tolerance glues them", path, pairs)
     rows = [row for patch in body for row in patch.knots]
     if min(float(np.diff(np.unique(row)).min()) for row in rows) < NARROWEST:
         raise InputError(f"{path}: has a knot span narrower than {NARROWEST:g}: derivatives there overflow; widen it")

@@ -6,7 +6,7 @@ from math import prod
 
 import numpy as np
 
-from parameterize.arrays import Array
+from parameterize.arrays import Array, listed
 from parameterize.spline.body import FLAT, TOLERANCE, Body, net_area
 from parameterize.spline.interface import Face, face_label, face_layer, orientations
 from parameterize.spline.interface_rows import gaps, rows_of
@@ -93,7 +93,7 @@ def _compare(body: Body, declared: Sequence[frozenset[Face]]) -> None:
                 reason = f"are {apart:.3g} apart, {share:.1e} of the body's size{close}"
             raise ValueError(f"interface {names}: the file says that they are one, but their control points {reason}")
     if declared and (more := found - set(declared)):
-        names = ", ".join(" = ".join(face_label(*face) for face in pair) for pair in sorted(map(sorted, more)))
+        names = listed([" = ".join(face_label(*face) for face in pair) for pair in sorted(map(sorted, more))])
         log.warning("%s: glued, for their control points are the same, though the file does not list them", names)
 
 

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from parameterize.arrays import Array, IntArray, in_brackets
+from parameterize.arrays import Array, IntArray, in_brackets, listed
 from parameterize.certificate.certify import Certificate
 from parameterize.certificate.jacobian import PatchCertificate
 from parameterize.config import MAX_CONTROL_POINTS
@@ -115,12 +115,13 @@ def in_words(report: Report) -> list[str]:
     """Return the places and the remedies, one a line; an empty list for a certified map."""
     quality, lines = report["parameterization"], []
     if found := quality.get("unproved"):
-        places = ", ".join(map(in_brackets, found["places"]))
+        places = listed(list(map(in_brackets, found["places"])), SHOWN)
         flat = f"; det J is zero, up to rounding, at {in_brackets(found['flat'])}" if "flat" in found else ""
         lines.append(f"not proved       on {found['spans']} spans, near {places}{flat}")
     if quality.get("overlap"):
         lines.append("overlaps         parts of the body lie in each other")
-    lines += [f"folded back      at {interface}" for interface in quality.get("misglued", ())]
+    if misglued := quality.get("misglued"):
+        lines.append(f"folded back      at {listed(misglued)}")
     if meeting := quality.get("boundary_meeting"):
         lines.append(f"meets itself     at {in_brackets(meeting['point'])}")
     return lines + [f"try              {remedy}" for remedy in report.get("advice", [])]

@@ -1,11 +1,13 @@
 """Writes, reads and judges report.json."""
 
+import heapq
 import json
 import math
 import platform
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from importlib.metadata import PackageNotFoundError, version
+from itertools import chain
 from pathlib import Path
 from typing import Any, Literal
 
@@ -20,6 +22,8 @@ from ..version import __version__
 from .artifacts import REPORT, SOLVED
 
 SCHEMA = 1
+MOST_LISTED = 1000  # patches: of more, report.json has the worst
+MOST_ROWS, WORST = 40, 10  # patches in a table, and those that are shown of more
 SAME_VOLUME = 1e-11  # rounding
 DEFECTS = ("unproved", "boundary_meeting", "misglued", "overlap")  # of the section `parameterization`
 
@@ -90,8 +94,64 @@ def claim(report: Report) -> str:
     Of patches of which some are left-handed it is "one sign of det J".
     """
     quality = report["parameterization"]
-    hands = {part.get("orientation", "right-handed") for part in quality.get("patches", [quality])}
-    return CLAIMS[hands.pop()] if len(hands) == 1 else "one sign of det J"
+    hands = summarized(quality)["summary"]["orientations"] if "patches" in quality else [_hand(quality)]
+    return CLAIMS[hands[0]] if len(hands) == 1 else "one sign of det J"
+
+
+def _hand(part: Report) -> str:
+    return str(part.get("orientation", "right-handed"))
+
+
+def summarized(quality: Report) -> Report:
+    """Return the section `parameterization` with a summary of several patches.
+
+    Of more than MOST_LISTED patches the section keeps the worst, each with its number, and the first interfaces.
+    """
+    if "patches" not in quality or "summary" in quality:
+        return quality
+    parts = quality["patches"]
+    summary: Report = {
+        "patches": len(parts),
+        "interfaces": len(quality.get("interfaces", ())),
+        "degrees": sorted({degree for part in parts for degree in part["degrees"]}),
+        "orientations": sorted(set(map(_hand, parts))),
+    }
+    found = quality | {"summary": summary}
+    if len(parts) <= MOST_LISTED:
+        return found
+    return found | {"patches": worst(parts), "interfaces": quality["interfaces"][:WORST]}
+
+
+def worst(parts: Sequence[Report]) -> list[Report]:
+    """Return the WORST patches with their numbers: those that are not certified, or have the least bounds of det J.
+
+    Where distortions were measured, half of them are those of the largest distortion.
+    """
+    numbered: list[Report] = [{"number": number} | part for number, part in enumerate(parts)]
+
+    def bound(part: Report) -> tuple[bool, float]:
+        least = part["det_lower_bound"]
+        return part["bijective"] == "certified", -math.inf if least is None else least
+
+    chosen = heapq.nsmallest(WORST, numbered, bound)
+    if "arap" in parts[0]:
+        largest = heapq.nlargest(WORST, numbered, lambda part: float(part["arap"]["max"]))
+        both = chain.from_iterable(zip(chosen, largest, strict=True))
+        chosen = list({part["number"]: part for part in both}.values())[:WORST]
+    return chosen
+
+
+def shown_patches(quality: Report) -> list[tuple[str, Report]]:
+    """Return the names of several patches with what is known of each: all of them, of many the worst."""
+    parts = quality.get("patches", [])
+    shown = worst(parts) if len(parts) > MOST_ROWS else parts
+    return [(f"p{part.get('number', number)}", part) for number, part in enumerate(shown)]
+
+
+def patches_heading(quality: Report) -> str:
+    """Return the heading of a table of several patches."""
+    count = summarized(quality)["summary"]["patches"] if "patches" in quality else 0
+    return f"The patches: of {count:,} the {WORST} worst" if count > MOST_ROWS else "The patches"
 
 
 def size_in_words(quality: Report, sign: str = " × ") -> str:

@@ -12,6 +12,7 @@ from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
+from parameterize.arrays import listed
 from parameterize.files import save_text
 from parameterize.old_names import ORIGINS
 
@@ -80,6 +81,7 @@ def page(report: Report, scene: dict[str, Any] | None, folder: Path) -> str:
         levels=_levels(section),
         extremes=extremes.table(section),
         patches=_patches(report["parameterization"]),
+        patches_heading=reports.patches_heading(report["parameterization"]),
         notices=notices(report),
         figures=[(heading, image) for file, heading, image in drawn if file != REGIONS],
         where=[(heading, image) for file, heading, image in drawn if file == REGIONS],
@@ -104,7 +106,7 @@ def verdicts(report: Report) -> list[tuple[str, str, str]]:
     whole = "every patch" if "patches" in quality else "the whole cube"
     meaning = MEANINGS[quality["bijective"]].format(claim=claim, whole=whole)
     if misglued := quality.get("misglued"):
-        meaning += f" Two patches lie on the same side of {', '.join(misglued)}."
+        meaning += f" Two patches lie on the same side of {listed(misglued)}."
     if quality.get("overlap"):
         meaning += " Parts of the body overlap."
     if quality.get("orientation") == "left-handed":
@@ -173,13 +175,13 @@ def _source(origin: str) -> tuple[str, str]:
 
 def _sizes(quality: Report) -> list[tuple[str, str, str]]:
     """Return the numbers of patches and of control points."""
-    points, parts = reports.size_in_words(quality), quality.get("patches")
-    if parts is None:
+    points = reports.size_in_words(quality)
+    if "patches" not in quality:
         return [("Control points", points, "degrees " + ", ".join(map(str, quality["degrees"])))]
-    glued = f"{len(quality['interfaces'])} interfaces, {quality['outer_faces']} outer faces"
-    degrees = sorted({degree for part in parts for degree in part["degrees"]})
-    said = f"shared ones once; degrees {', '.join(map(str, degrees))}"
-    return [("Patches", str(len(parts)), glued), ("Control points", points, said)]
+    found = reports.summarized(quality)["summary"]
+    glued = f"{found['interfaces']:,} interfaces, {quality['outer_faces']:,} outer faces"
+    said = f"shared ones once; degrees {', '.join(map(str, found['degrees']))}"
+    return [("Patches", f"{found['patches']:,}", glued), ("Control points", points, said)]
 
 
 def _error_fact(level: Report, absolute: str, relative: str) -> tuple[str, str, str]:
@@ -200,8 +202,11 @@ def _levels(section: Report) -> list[list[str]]:
 
 
 def _patches(quality: Report) -> list[list[str]]:
-    """Return the table of several patches: the titles of what is known, then a row a patch; no row for a volume."""
-    rows = [{"patch": f"p{number}", **_patch(patch)} for number, patch in enumerate(quality.get("patches", ()))]
+    """Return the table of several patches: the titles of what is known, then a row a patch; no row for a volume.
+
+    Of many patches the worst are shown.
+    """
+    rows = [{"patch": name, **_patch(patch)} for name, patch in reports.shown_patches(quality)]
     return [list(rows[0]), *(list(row.values()) for row in rows)] if rows else []
 
 

@@ -114,6 +114,8 @@ class RunFolder:
 
     def write(self, **sections: Any) -> None:
         """Add sections to the report and write it."""
+        if "parameterization" in sections:
+            sections["parameterization"] = reports.summarized(sections["parameterization"])
         self.report.update(sections)
         reports.write(self.folder, self.report | {"seconds": self.seconds})
 
