@@ -63,3 +63,33 @@ def test_verdict_keeps_the_numbers():
 
 def test_the_errors_of_a_level_are_those_of_a_solve():
     assert (*EXACT_ERRORS, *ESTIMATES) == tuple(NORMS)
+
+
+def test_of_thousands_of_patches_the_report_keeps_the_worst():
+    """Patch 17 is not certified, patch 900 has the least bound, patch 1200 is the most distorted."""
+    parts = [
+        {
+            "control_points": [4, 4, 4],
+            "degrees": [3, 3, 2],
+            "bijective": "undecided" if number == 17 else "certified",
+            "orientation": "left-handed" if number == 3 else "right-handed",
+            "det_lower_bound": None if number == 17 else 0.01 if number == 900 else 0.5,
+            "arap": {"mean": 0.1, "max": 9.0 if number == 1200 else 0.2},
+        }
+        for number in range(1500)
+    ]
+    quality = {"patches": parts, "interfaces": ["p0_u1 = p1_u0"] * 2000, "bijective": "undecided"}
+    short = reports.summarized(quality)
+    assert short["summary"] == {
+        "patches": 1500,
+        "interfaces": 2000,
+        "degrees": [2, 3],
+        "orientations": ["left-handed", "right-handed"],
+    }
+    assert [part["number"] for part in short["patches"][:4]] == [17, 1200, 900, 0] and len(short["interfaces"]) == 10
+    assert reports.summarized(short) is short and reports.claim({"parameterization": short}) == "one sign of det J"
+    assert reports.shown_patches(short)[0][0] == reports.shown_patches(quality)[0][0] == "p17"
+    assert reports.patches_heading(short) == reports.patches_heading(quality) == "The patches: of 1,500 the 10 worst"
+    few = reports.summarized(quality | {"patches": parts[:30]})
+    assert len(few["patches"]) == 30 and reports.patches_heading(few) == "The patches"
+    assert [name for name, _ in reports.shown_patches(few)] == [f"p{number}" for number in range(30)]

@@ -1,5 +1,6 @@
 """Shows a result in a notebook: its facts as a table, without pictures."""
 
+import heapq
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict
 from functools import singledispatch
@@ -115,10 +116,18 @@ def _patches(patches: Sequence[BoxDistortion]) -> str:
             f"{one.arap.max:.4g}",
             f"{one.scaled_jacobian:.3g}",
         )
-        for i, one in enumerate(patches)
+        for i, one in _shown(patches)
     ]
     head = ("", "own box", "ARAP, mean", "ARAP, max", "least scaled det J")
-    return _table("Patches, as given", rows, head) if rows else ""
+    title = "Patches, as given" if len(rows) == len(patches) else f"The most distorted of {len(patches):,} patches"
+    return _table(title, rows, head) if rows else ""
+
+
+def _shown(patches: Sequence[BoxDistortion]) -> list[tuple[int, BoxDistortion]]:
+    """Return patches with their numbers, of many the most distorted."""
+    numbered = list(enumerate(patches))
+    few = len(numbered) <= reports.MOST_ROWS
+    return numbered if few else heapq.nlargest(reports.WORST, numbered, key=lambda pair: pair[1].arap.max)
 
 
 @as_html.register
