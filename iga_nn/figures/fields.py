@@ -11,7 +11,7 @@ the patch, and the number among the nine.
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial, wraps
+from functools import cache, partial, wraps
 from operator import itemgetter
 from typing import Any, Self, TypeVar
 
@@ -22,6 +22,7 @@ from parameterize.arrays import Array, IntArray
 from parameterize.quality.distortion import in_boxes, own_boxes, unmirrored
 from parameterize.spline.body import BodyLike, as_body
 from parameterize.spline.orientation import orientations
+from parameterize.spline.patch_groups import PatchGroup
 from parameterize.spline.spline_stack import SplineStack
 from parameterize.spline.volume import AXES, BSplineVolume
 from solve.field import FieldOnBody, Points
@@ -244,15 +245,17 @@ def arap_of(body: BodyLike) -> Parts:
     A volume is measured at volume 1, each of several patches against its own box.
     """
     glued = as_body(body)
-    boxes = np.full((1, 3), UnitFrame.of(glued).length) if glued.is_single else own_boxes(glued)
-    return [
-        (group.numbers, partial(_arap_on, group.stack, orientations(group), boxes[group.numbers]))
-        for group in glued.groups
-    ]
+
+    @cache
+    def boxes() -> Array:
+        return np.full((1, 3), UnitFrame.of(glued).length) if glued.is_single else own_boxes(glued)
+
+    return [(group.numbers, partial(_arap_on, group, boxes)) for group in glued.groups]
 
 
-def _arap_on(maps: SplineStack, hands: IntArray, boxes: Array, rows: IntArray, u: Array, v: Array, w: Array) -> Array:
-    return in_boxes(unmirrored(maps.take(rows).grid_slopes(u, v, w), hands[rows]), boxes[rows])
+def _arap_on(group: PatchGroup, boxes: Callable[[], Array], rows: IntArray, u: Array, v: Array, w: Array) -> Array:
+    jacobians = group.stack.take(rows).grid_slopes(u, v, w)
+    return in_boxes(unmirrored(jacobians, orientations(group)[rows]), boxes()[group.numbers[rows]])
 
 
 @remembered
@@ -271,7 +274,7 @@ def vectors_of(solution: FieldOnBody) -> Samples:
 
 def vectors_on(solution: FieldOnBody) -> Parts:
     """Return the function that gives the vectors (..., c) of a solution of several components, or its values (...)."""
-    return [(group.numbers, partial(_values_on, group, is_vector(solution))) for group in groups_of(solution)]
+    return [(group.numbers, partial(_values_on, group, is_vector(solution))) for group in known_groups(solution)]
 
 
 def is_vector(solution: FieldOnBody) -> bool:
@@ -310,7 +313,7 @@ def quantity_of(
 
     quantity: also a function for each group of patches, whose materials differ, see `solve.field_groups`.
     """
-    groups = groups_of(solution)
+    groups = known_groups(solution)
     laws = quantity if isinstance(quantity, Sequence) else [quantity] * len(groups)
     parts = [(group.numbers, partial(_quantity_on, group, law)) for group, law in zip(groups, laws, strict=True)]
     try:
@@ -332,11 +335,14 @@ def fields_of(solution: FieldOnBody) -> list[ColoredField]:
     fields = [solution_of(solution)]
     if is_spatial(solution):
         fields += components_of(solution)
-    laws = [group.problem.form.quantities.get("von_mises") for group in groups_of(solution) if group.problem]
+    laws = [group.problem.form.quantities.get("von_mises") for group in known_groups(solution) if group.problem]
     if laws and None not in laws:
         stress = quantity_of(solution, [law for law in laws if law], STRESS, "von Mises stress")
         return fields if stress is None else [stress, *fields]
     return fields
+
+
+known_groups = remembered(groups_of)
 
 
 def problems_on(problem: BoundaryValueProblem, body: BodyLike) -> list[BoundaryValueProblem]:
@@ -355,7 +361,8 @@ def error_at(values: Array, problem: BoundaryValueProblem, x: Points) -> Array:
 @remembered
 def error_of(body: BodyLike, solution: FieldOnBody, problem: BoundaryValueProblem) -> ColoredField:
     """Return |u - u_h|, whose range is logarithmic. problem: its exact solution is known."""
-    groups = groups_of(solution, as_body(body), problems_on(problem, body))
+    is_own = getattr(solution, "problem", None) is problem.on(body)
+    groups = known_groups(solution) if is_own else groups_of(solution, as_body(body), problems_on(problem, body))
     parts = [(group.numbers, partial(_error_on, group, is_vector(solution))) for group in groups]
     samples = sampled(body, parts)
     limits = error_range([samples.everywhere])

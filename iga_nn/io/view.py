@@ -34,7 +34,7 @@ from solve.quantities import group_values, quantity_of
 from solve.solution import Solution
 
 from ..errors import InputError, one_line
-from ..figures.fields import OnGrid, arap_of, error_at, problems_on
+from ..figures.fields import OnGrid, arap_of, error_at, known_groups, problems_on
 from .vtk import bezier_cells, save
 
 if TYPE_CHECKING:
@@ -165,10 +165,11 @@ def _parts(body: BodyLike, solution: FieldOnBody | None, problem: BoundaryValueP
     ]
     if solution is None:
         return parts
-    problems = () if problem is None else problems_on(problem, glued)
+    known = isinstance(solution, Solution)  # it knows the problem on each patch
+    problems = () if problem is None or known else problems_on(problem, glued)
     return [
         _with_functions(next(part for part in parts if own.numbers[0] in part.numbers), own)
-        for own in groups_of(solution, glued, problems)
+        for own in (known_groups(solution) if known else groups_of(solution, glued, problems))
     ]
 
 

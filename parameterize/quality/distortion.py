@@ -149,7 +149,7 @@ def _slabs(group: PatchGroup, rules: Rules) -> Iterator[tuple[tuple[slice, slice
     step = max(1, _SLAB_POINTS // (len(v) * len(w)))
     for begin, part in zip(range(0, len(group), together), group.divided(together), strict=True):
         rows = slice(begin, begin + together)
-        hands = orientations(part)
+        hands = orientations(group)[rows]
         for start in range(0, len(u), step):
             jacobians = part.grid_jacobian(u[start : start + step], v, w)
             yield (rows, slice(start, start + step)), unmirrored(jacobians, hands)

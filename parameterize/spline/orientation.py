@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from itertools import product
 from math import ceil, log2
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -17,6 +18,7 @@ from .patch_groups import PatchGroup, group_of
 from .volume import BSplineVolume
 
 FACES = tuple(product(range(3), (0, 1)))  # axis and side
+_FOUND: WeakKeyDictionary[PatchGroup, IntArray] = WeakKeyDictionary()  # orientations
 RATIONAL_POINTS = 12  # measured on arcs of 90, 120 and 180 degrees
 
 
@@ -92,7 +94,13 @@ def orientation(volume: BSplineVolume) -> int:
 
 
 def orientations(group: PatchGroup) -> IntArray:
-    """Return the orientation of each patch of a group (k,), see `orientation`."""
+    """Return the orientation of each patch of a group (k,), see `orientation`; they are found once."""
+    if group not in _FOUND:
+        _FOUND[group] = _orientations(group)
+    return _FOUND[group]
+
+
+def _orientations(group: PatchGroup) -> IntArray:
     points = group.control_points
     low, high = points.min(axis=(1, 2, 3)), points.max(axis=(1, 2, 3))
     size = (high - low).max(axis=1)
