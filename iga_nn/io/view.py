@@ -165,11 +165,11 @@ def _parts(body: BodyLike, solution: FieldOnBody | None, problem: BoundaryValueP
     ]
     if solution is None:
         return parts
-    known = isinstance(solution, Solution)  # it knows the problem on each patch
-    problems = () if problem is None or known else problems_on(problem, glued)
+    is_known = isinstance(solution, Solution)  # it knows the problem on each patch
+    problems = () if problem is None or is_known else problems_on(problem, glued)
     return [
         _with_functions(next(part for part in parts if own.numbers[0] in part.numbers), own)
-        for own in (known_groups(solution) if known else groups_of(solution, glued, problems))
+        for own in (known_groups(solution) if is_known else groups_of(solution, glued, problems))
     ]
 
 

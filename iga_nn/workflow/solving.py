@@ -9,12 +9,13 @@ from typing import Any
 
 import numpy as np
 
-from parameterize.spline.body import BodyLike
+from parameterize.spline.body import BodyLike, as_body
 from solve import ConvergenceError, ConvergenceRow, Modes, Solution, SolveOptions, SolveReport, rates, solve_with
 from solve.forms.boundary_value_problem import BoundaryValueProblem
 from solve.forms.frame import UnitFrame
 
 from ..errors import InputError, input_errors, one_line
+from ..figures.fields import NAMED
 from ..options import NO_UNITS, ProblemOptions, Units
 from ..report import document as reports
 from ..report import html
@@ -89,7 +90,8 @@ def _show(
     """Draw the finest solution, write it for ParaView, and return what its view takes."""
     assert done.finest is not None
     _draw(state, body, done, problem, problem_options.units)
-    if len(problem.dirichlet) < 6 or problem.patch_faces:  # the user names faces: show which is which
+    are_named = len(problem.dirichlet) < 6 or problem.patch_faces
+    if are_named and len(as_body(body).outer_faces) <= NAMED:  # show which is which
         state.draw("solution", named_volume=body)
     _write_cells(state, done.finest)
     return done.finest, problem, problem_options.units
