@@ -12,7 +12,7 @@ from matplotlib.patches import Patch as Swatch
 
 from parameterize.arrays import Array, IntArray
 from parameterize.spline.body import Body, BodyLike, as_body
-from parameterize.spline.orientation import orientations
+from parameterize.spline.orientation import hands_of
 from parameterize.spline.volume import FACE_NAMES
 from parameterize.surface.geometry import normals_and_areas
 from parameterize.surface.surface import Surface
@@ -50,9 +50,7 @@ def _normals(body: Body, places: IntArray, samples: int) -> Array:
     """Return the outward unit normals (k, samples, samples, 3) of outer faces (k,)."""
     patches, faces = np.divmod(places, PER_PATCH)
     slopes = on_planes(slopes_of(body), places, samples)
-    normals, hands = np.empty(slopes.shape[:-1]), np.empty(len(body))
-    for group in body.groups:
-        hands[group.numbers] = orientations(group)
+    normals, hands = np.empty(slopes.shape[:-1]), hands_of(body.groups)
     for number in range(len(FACE_NAMES)):
         axis, side = divmod(number, 2)
         b, c = (slopes[faces == number][..., (axis + step) % 3] for step in (1, 2))

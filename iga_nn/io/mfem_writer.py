@@ -18,7 +18,7 @@ import numpy as np
 from parameterize.arrays import Array, Floats, IntArray
 from parameterize.spline.body import Body, BodyLike, as_body, shared_numbers
 from parameterize.spline.interface import Interface, axis_side
-from parameterize.spline.orientation import orientation
+from parameterize.spline.orientation import hands_of, orientation
 from parameterize.spline.volume import BSplineVolume
 from solve.field import SplineField
 
@@ -89,7 +89,7 @@ def _on_knots_of(field: SplineField, volume: BSplineVolume) -> BSplineVolume:
 
 def right_handed(body: Body) -> Body:
     """Return the same body with w reversed in its left-handed patches; the others stay the same objects."""
-    left = [orientation(patch) < 0 for patch in body]
+    left = (hands_of(body.groups) < 0).tolist()
     if not any(left):
         return body
     patches = [_with_w_reversed(patch) if back else patch for patch, back in zip(body, left, strict=True)]

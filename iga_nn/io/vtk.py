@@ -40,7 +40,7 @@ from parameterize.spline.bspline import (
     sparse_rows,
 )
 from parameterize.spline.interface import WEIGHT_TOLERANCE, Interface, face_layer
-from parameterize.spline.orientation import orientation
+from parameterize.spline.orientation import hands_of
 from parameterize.spline.rational import projected
 from parameterize.spline.volume import BSplineVolume
 from solve.field import FieldOnBody, SplineField
@@ -85,7 +85,8 @@ def bezier_cells(body: BodyLike, solution: FieldOnBody | None) -> pyvista.Unstru
 
     body = as_body(body)
     fields = (None,) * len(body) if solution is None else solution.patches
-    parts = [_exact(patch, field) for patch, field in zip(body, fields, strict=True)]
+    are_left = hands_of(body.groups) < 0
+    parts = [_exact(*part) for part in zip(body, fields, are_left.tolist(), strict=True)]
     weights = [part.weights for part in parts]
     glued = [interface for interface in body.interfaces if _are_alike(weights, interface)]
     labels, count = shared_numbers([row.shape for row in weights], glued)
@@ -121,8 +122,8 @@ def _are_alike(weights: Sequence[Array], interface: Interface) -> bool:
     return first.shape == second.shape and np.allclose(first, second, rtol=WEIGHT_TOLERANCE, atol=0.0)
 
 
-def _exact(volume: BSplineVolume, solution: SplineField | None) -> _Exact:
-    """Return the cells of a volume with the coefficients of a solution on it."""
+def _exact(volume: BSplineVolume, solution: SplineField | None, is_left: bool) -> _Exact:
+    """Return the cells of a volume with the coefficients of a solution on it. is_left: whether it is left-handed."""
     shown: list[BSplineVolume | SplineField] = [volume] if solution is None else [volume, solution]
     breaks, degrees = breaks_of(volume, solution), [max(s.degrees[a] for s in shown) for a in range(3)]
     if volume.weights is not None and solution is not None:
@@ -130,7 +131,7 @@ def _exact(volume: BSplineVolume, solution: SplineField | None) -> _Exact:
     net = volume.control_points if volume.weights is None else volume.homogeneous
     net = _bernstein(volume.degrees, volume.knots, net, breaks, degrees)
     points, weights = (net, np.ones(net.shape[:3])) if volume.weights is None else projected(net)
-    cells = _cells([len(b) - 1 for b in breaks], degrees, orientation(volume) < 0)
+    cells = _cells([len(b) - 1 for b in breaks], degrees, is_left)
     values = None
     if solution is not None and volume.weights is None:
         values = _bernstein(solution.degrees, solution.knots, solution.coefficients, breaks, degrees)

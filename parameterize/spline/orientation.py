@@ -93,6 +93,14 @@ def orientation(volume: BSplineVolume) -> int:
     return int(orientations(group_of(volume))[0])
 
 
+def hands_of(groups: Sequence[PatchGroup]) -> IntArray:
+    """Return the orientation of each patch of a body (patches,), from the body's groups."""
+    hands = np.empty(sum(map(len, groups)), dtype=np.int64)
+    for group in groups:
+        hands[group.numbers] = orientations(group)
+    return hands
+
+
 def orientations(group: PatchGroup) -> IntArray:
     """Return the orientation of each patch of a group (k,), see `orientation`; they are found once."""
     if group not in _FOUND:
