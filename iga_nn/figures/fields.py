@@ -283,7 +283,7 @@ def is_vector(solution: FieldOnBody) -> bool:
 
 
 def _values_on(group: FieldGroup, with_axis: bool, rows: IntArray, u: Array, v: Array, w: Array) -> Array:
-    values = group.values.take(rows).grid(u, v, w)
+    values = group.take(rows).function_on(u, v, w)
     return values if with_axis else values[..., 0]
 
 

@@ -271,7 +271,7 @@ def _of(part: _Part, rows: Rows, quantities: Quantities | None) -> dict[str, Arr
     if functions is None:
         return {}
     u, v, w = rows
-    values = functions.values.grid(u, v, w)
+    values = functions.function_on(u, v, w)
     fields = {"u": values[..., 0] if values.shape[-1] == 1 else values}
     if (problem := functions.problem) is None:
         return fields
