@@ -54,7 +54,9 @@ def laws(held: str) -> dict[str, Problem]:
         "Poisson": iga_nn.Poisson(source="1", value={held: "0"}),
         "exchange all round": iga_nn.Poisson(source="1", kappa=0.2, exchange={"z > -1e9": (5e-5, 25)}),
         "elasticity": iga_nn.Elasticity(young=1.0, poisson_ratio=0.3, fix=held, body_force=("0", "0", "-1")),
-        "springs alone": iga_nn.Elasticity(young=1.0, poisson_ratio=0.3, body_force=("0", "0", "-1"), spring={held: 1e-3}),
+        "springs alone": iga_nn.Elasticity(
+            young=1.0, poisson_ratio=0.3, body_force=("0", "0", "-1"), spring={held: 1e-3}
+        ),
     }
 
 
@@ -78,7 +80,16 @@ def hexahedra(count: int, degree: int) -> iga_nn.Body:
     patches = []
     for first in range(4):
         a, b, c = (k for k in range(4) if k != first)
-        of_cell = [(first,), (first, c), (first, b), (first, b, c), (first, a), (first, a, c), (first, a, b), (0, 1, 2, 3)]
+        of_cell = [
+            (first,),
+            (first, c),
+            (first, b),
+            (first, b, c),
+            (first, a),
+            (first, a, c),
+            (first, a, b),
+            (0, 1, 2, 3),
+        ]
         eight = np.stack([whole[corners[:, part]].mean(axis=1) for part in of_cell], axis=1).reshape(-1, 2, 2, 2, 3)
         for one in eight:
             patches.append(iga_nn.BSplineVolume.from_function(_bent(one), degree + 1, degree=degree))

@@ -109,7 +109,7 @@ class FaceRule:
         b, c = (basis.power(2) for basis in self.bases)
         diagonal[self.layer] += b.T @ self.measure @ c
 
-    def add_lumped(self, component: int, diagonal: Array) -> None:
+    def add_lumped(self, component: int, diagonal: Array, share: float = 1.0) -> None:
         """Add the integral of alpha times each function to an array (n_u, n_v, n_w)."""
         diagonal[self.layer] += self.integrate(np.ones(self.measure.shape))
 

@@ -42,8 +42,11 @@ class FaceTerm(Protocol):
     def add_diagonal(self, component: int, diagonal: Array) -> None:
         """Add the diagonal of a component's block to an array (n_u, n_v, n_w)."""
 
-    def add_lumped(self, component: int, diagonal: Array) -> None:
-        """Add the integral of the factor of u . v with each function to an array (n_u, n_v, n_w)."""
+    def add_lumped(self, component: int, diagonal: Array, share: float = 1.0) -> None:
+        """Add the integral of the factor of u . v with each function to an array (n_u, n_v, n_w).
+
+        share: of Nitsche's factor that counts where values are held weakly.
+        """
 
     def stiffness(self, component: int) -> float:
         """Return the integral of the factor of u . v for one component, the mean over the face's parameters."""

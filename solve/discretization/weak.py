@@ -158,10 +158,11 @@ class WeakFace:
         layer = diagonal[self.layers[0]]
         layer += found.reshape(layer.shape)
 
-    def add_lumped(self, component: int, diagonal: Array) -> None:
-        """Add the integral of gamma and of the factors times each function to an array (n_u, n_v, n_w)."""
+    def add_lumped(self, component: int, diagonal: Array, share: float = 1.0) -> None:
+        """Add the integral of a share of gamma and of the factors times each function to an array (n_u, n_v, n_w)."""
         layer = diagonal[self.layers[0]]
-        layer += (self.tables[0].T @ self.stiff[component, component]).reshape(layer.shape)
+        stiff = self.stiff[component, component] - (1.0 - share) * self.gamma * self.held[component, component]
+        layer += (self.tables[0].T @ stiff).reshape(layer.shape)
 
     def stiffness(self, component: int) -> float:
         """Return the factor of u v of one component that represents the face in the preconditioner, integrated over it.
