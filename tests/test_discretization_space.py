@@ -3,7 +3,7 @@ import pytest
 
 from parameterize.spline.bspline import evaluate_at, greville, open_uniform_knots
 from parameterize.spline.volume import BSplineVolume
-from solve.discretization.space import embedded, longest_edge, trial_space
+from solve.discretization.space import embedded, longest_edges, trial_space
 from solve.study import benchmark_volume
 
 
@@ -59,8 +59,8 @@ def test_one_gauss_point_more_on_a_single_span():
 
 def test_h_is_the_longest_edge_over_the_mesh():
     volume = box((4.0, 1.0, 0.25))
-    assert longest_edge(volume, trial_space(volume)) == pytest.approx(1.0)
-    assert longest_edge(volume, trial_space(volume, refine=1)) == pytest.approx(0.5)
+    assert longest_edges([volume], [trial_space(volume)]) == pytest.approx(1.0)
+    assert longest_edges([volume], [trial_space(volume, refine=1)]) == pytest.approx(0.5)
 
 
 @pytest.mark.parametrize("arguments", [{"refine": -1}, {"degree": 0}])

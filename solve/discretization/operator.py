@@ -178,7 +178,7 @@ def _stacks(operators: Sequence[Operator]) -> Iterator[tuple[list[int], Stack, A
 class FormOperator(MatrixFree):
     """Apply the matrix of any law's form.
 
-    rows: (q_u, 3, 3, q_w, q_v), R of `geometry_planes`, stored for a constant law; for other laws R is computed from
+    rows: (q_u, 3, 3, q_w, q_v), R of `Stack.geometry`, stored for a constant law; for other laws R is computed from
     the map in every product.
     """
 

@@ -252,16 +252,3 @@ def divide(fields: Array, weight: Array) -> None:
     """Divide components A (3, 4, q_w, q_v), values and gradients, by the weight W (4, q_w, q_v) in place."""
     fields[:, 0] /= weight[0]
     fields[:, 1:] = (fields[:, 1:] - fields[:, :1] * weight[1:]) / weight[0]
-
-
-def geometry_planes(
-    volume: BSplineVolume, rule: GaussRule, points: Iterable[int] | None = None
-) -> Iterator[tuple[int, Array, Array, Points]]:
-    """Yield as `map_planes` does: q, rows R (3, 3, q_w, q_v), w det J (q_w, q_v), and the points in space.
-
-    R is J^-1 times the root of w |det J|; docs/solver.md explains how gradients and fluxes are multiplied by it.
-    """
-    rows, measure = np.empty((3, 3, *rule.plane_shape)), np.empty(rule.plane_shape)
-    for q, fields, x in map_planes(volume, rule, points):
-        kernels.plane_rows(fields, rule.plane_weights(q), rows, measure)
-        yield q, rows, measure, x

@@ -253,11 +253,6 @@ def same_smoothness(knots: Array, old: int, new: int) -> Array:
     return np.repeat(values, repeats)
 
 
-def longest_edge(volume: BSplineVolume, space: TrialSpace) -> float:
-    """Return h of one patch, as `longest_edges` does."""
-    return longest_edges([volume], [space])
-
-
 def longest_edges(volumes: Sequence[BSplineVolume], spaces: Sequence[TrialSpace]) -> float:
     """Return h: the longest straight distance between neighbouring corners of an element, in the volumes' units."""
     longest, groups = 0.0, defaultdict(list)
