@@ -27,7 +27,7 @@ from .multigrid import Multigrid
 from .nodal import NodalBasis
 from .preconditioner import NO_FACTORS, leaves_constants
 
-HELD = 0.25  # of Nitsche's factor, from which terms with the flux take: 192 hexahedra take 72 iterations, with 1 they take 99
+HELD = 0.25  # of Nitsche's factor, from which the flux takes: 192 hexahedra take 72 iterations, with 1 they take 99
 LOCAL = 0.5  # the share of the inverted diagonal: on the flange 52 iterations, without it 70, with 2 it is 65
 
 
