@@ -71,6 +71,8 @@ class SolveReport:
     traffic : dict of str to float
         With several processes, the bytes that all send together in a step of the linear solver: for copies of rows
         ("halo"), and in the preconditioner ("transposition", "substitution").
+    memory : tuple of float
+        With several processes, the most resident memory that each has had so far, in megabytes, the program included.
     balance : Balance or None
         The loads on the body and the reactions of its supports.
     formulation : str
@@ -100,6 +102,7 @@ class SolveReport:
     traffic: Mapping[str, float] = field(default_factory=dict)
     balance: Balance | None = None
     formulation: str = "displacement"
+    memory: tuple[float, ...] = ()
 
     l2 = _known("errors", "l2")
     l2_relative = _known("errors", "l2_relative")
@@ -114,7 +117,8 @@ class SolveReport:
         found = {name: value for name in names if (value := getattr(self, name)) is not None}
         found |= self.balance.as_dict() if self.balance and self.balance.is_told else {}
         found |= {} if self.formulation == "displacement" else {"formulation": self.formulation}
-        return found | ({"traffic": dict(self.traffic)} if self.traffic else {})
+        found |= {"traffic": dict(self.traffic)} if self.traffic else {}
+        return found | ({"memory_mb": list(self.memory)} if self.memory else {})
 
     def __str__(self) -> str:
         parts = [f"{self.elements} elements", f"{self.dofs} dofs", f"h {self.h:.4g}"]

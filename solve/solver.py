@@ -16,10 +16,10 @@ from parameterize.spline.volume import BSplineVolume
 
 from .assembly import assemble_body_data, balanced
 from .discretization.on_regions import demand_area, demand_supports
+from .discretization.parted import shared_unknowns
 from .discretization.quadrature import gauss_rule, map_planes
 from .discretization.slab import shared_space
 from .discretization.space import trial_space
-from .discretization.unknowns import unknowns_of
 from .discretization.weak import WeakFace
 from .forms.boundary_value_problem import BoundaryValueProblem
 from .forms.elasticity import Elasticity
@@ -170,7 +170,7 @@ def prepared(
         )
     for of_map in {patch.volume.degrees for patch in patches}:
         _warm_up(of_map, options.degree, placed.form.components == 1 and placed.form.symmetric)
-    return placed, [replace(patch, space=shared_space(patch.space, options.comm)) for patch in patches]
+    return placed, patches
 
 
 def _on_patches(
@@ -179,8 +179,6 @@ def _on_patches(
     """Return the problem placed in the body, and the problem on each patch."""
     if not isinstance(problem, BoundaryValueProblem):
         raise TypeError(f"problem must be a Poisson, an Elasticity or a Problem, got {type(problem).__name__}")
-    if not body.is_single and options.comm is not None and options.comm.size > 1:
-        raise ValueError("a body of several patches is solved by one process: leave comm out")
     _demand_known_patches(body, problem)
     placed, patches, rings = problem.on(body), [], defaultdict(list)
     for interface in body.interfaces:
@@ -188,7 +186,8 @@ def _on_patches(
             rings[interface.first[0]].append(interface.ring)
     for i, (volume, own) in enumerate(zip(body, placed.on_patches(body), strict=True)):
         space = trial_space(volume, options.refine, options.degree, own.dirichlet, body.outer[i])
-        patches.append(PatchProblem(volume, own, replace(space, periodic=tuple(rings[i]))))
+        space = replace(space, periodic=tuple(rings[i]))
+        patches.append(PatchProblem(volume, own, shared_space(space, options.comm) if body.is_single else space))
     return placed, patches
 
 
@@ -213,8 +212,7 @@ def check_problem(body: BodyLike, problem: BoundaryValueProblem, comm: Any = Non
     options = SolveOptions(threads=1, quadrature="gauss", comm=comm)
     glued = as_body(body)
     _, patches = _on_patches(glued, problem, options)
-    patches = [replace(patch, space=shared_space(patch.space, comm)) for patch in patches]
-    unknowns = unknowns_of([patch.space for patch in patches], glued.interfaces)
+    unknowns = shared_unknowns(glued, [patch.space for patch in patches], comm)
     own = [patches[number] for number in unknowns.patches]
     with unknowns.agreed():
         matrix, loads, _ = assemble_body_data(own, options)

@@ -25,11 +25,12 @@ from .discretization.estimate import error_estimate, estimated_squares, why_not_
 from .discretization.grouped import BodyMatrix, Law, assemble_body
 from .discretization.on_regions import demand_area, demand_supports
 from .discretization.operator import FormOperator, Operator
-from .discretization.processes import Processes
+from .discretization.parted import shared_unknowns
+from .discretization.processes import Processes, most_memory
 from .discretization.quadrature import GaussRule, operator_rule
 from .discretization.residual import Solved
 from .discretization.space import embedded, longest_edges
-from .discretization.unknowns import Glued, Unknowns, Window, unknowns_of
+from .discretization.unknowns import Glued, Unknowns, Window
 from .field import BodyField, FieldOnBody, SplineField
 from .forms.boundary_value_problem import BoundaryValueProblem
 from .forms.mass import Mass
@@ -255,6 +256,7 @@ class System:
             meaningful=meaningful and has_norm,
             residuals=result.residuals,
             traffic=traffic,
+            memory=most_memory(processes),
             balance=self._balance(full) if has_norm else None,
             formulation=self.formulation,
         )
@@ -404,7 +406,7 @@ def build(
     """
     start = time.process_time()
     with one_blas_thread():
-        unknowns = unknowns_of([patch.space for patch in patches], body.interfaces)
+        unknowns = shared_unknowns(body, [patch.space for patch in patches], options.comm)
         with unknowns.agreed():
             found = assemble_body_data([patches[number] for number in unknowns.patches], options)
         system = system_of(body, problem, patches, unknowns, found, is_loose)

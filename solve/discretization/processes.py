@@ -1,5 +1,6 @@
 """Defines the processes that share a body: a Messenger passes arrays and numbers between those of an MPI job."""
 
+import sys
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -40,6 +41,22 @@ def agreed(comm: Any) -> Iterator[None]:
     for found in comm.allgather(fault):
         if found is not None:
             raise found
+
+
+def most_memory(processes: Processes) -> tuple[float, ...]:
+    """Return the most resident memory that each of several processes has had, in MB; nothing of a single process."""
+    size = 1.0 if sys.platform == "darwin" else 1024.0  # of the unit, in bytes
+    found = processes.shared(_peak() * size / 1e6)
+    return tuple(found) if len(found) > 1 else ()
+
+
+def _peak() -> int:
+    """Return the most resident memory so far, 0 where the system does not say."""
+    try:
+        import resource
+    except ImportError:
+        return 0
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
 
 
 class Messenger:

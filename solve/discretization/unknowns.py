@@ -157,8 +157,9 @@ class Glued:
     """Number the unknowns of patches that are glued along faces.
 
     spaces: those of the patches. numbers: for each patch the number (n_u, n_v, n_w) of each coefficient in the body.
-    count: how many numbers there are. fixed: (count,), whether boundary data fix a coefficient: where it lies on a
-    Dirichlet face of some patch.
+    count: how many coefficients the body has. fixed: (size,), whether boundary data fix a coefficient: where it lies on
+    a Dirichlet face of some patch. Here the size is the count; `parted.Parted` has some of the patches, and a smaller
+    size.
     """
 
     spaces: tuple[TrialSpace, ...]
@@ -189,8 +190,23 @@ class Glued:
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """Return the number of free coefficients."""
-        return (int(self.count - self.fixed.sum()),)
+        """Return the number of free coefficients that this process owns."""
+        return self.free.shape
+
+    @property
+    def names(self) -> IntArray:
+        """Return the number (size,) of each coefficient in the body."""
+        return np.arange(self.count)
+
+    @property
+    def is_own(self) -> Mask | bool:
+        """Return whether this process owns each coefficient."""
+        return True
+
+    @cached_property
+    def free(self) -> IntArray:
+        """Return the numbers (m,) of the coefficients in a vector."""
+        return np.flatnonzero(~self.fixed & self.is_own)
 
     @cached_property
     def layout(self) -> Layout:
@@ -199,39 +215,53 @@ class Glued:
 
     @cached_property
     def places(self) -> list[IntArray]:
-        """Return for each patch the place (n_u, n_v, n_w) of each coefficient in a vector; its length where fixed."""
-        order = np.where(self.fixed, self.shape[0], np.cumsum(~self.fixed) - 1)
-        return [order[own] for own in self.numbers]
+        """Return for each patch the place (n_u, n_v, n_w) of each coefficient in a vector; its length for others."""
+        place = np.full(len(self.fixed), self.shape[0])
+        place[self.free] = np.arange(self.shape[0])
+        return [place[own] for own in self.numbers]
+
+    def fill(self, coefficients: Array) -> None:
+        """Overwrite the copies among coefficients (c, size) by the values of their owners."""
+
+    def add(self, integrals: Array) -> None:
+        """Add to own integrals (c, size) those over the copies of other processes."""
 
     def spread(self, x: Array) -> OnPatches:
         """Return the coefficients (c, n_u, n_v, n_w) of each patch of a vector (c, m), zero where they are fixed."""
-        padded = np.concatenate([x, np.zeros((len(x), 1))], axis=1)
-        return OnPatches(self.layout, len(x), padded.ravel()[self._entries(len(x))])
+        every = np.zeros((len(x), len(self.fixed)))
+        every[:, self.free] = x
+        self.fill(every)
+        return OnPatches(self.layout, len(x), every.ravel()[self._entries(len(x))])
 
     def collect(self, integrals: Sequence[Array]) -> Array:
         """Return the vector (c, m) of integrals (c, n_u, n_v, n_w) over each patch, copies added."""
-        parts = self.layout.joined(integrals)
-        sums = np.bincount(self._entries(parts.components), parts.flat, parts.components * (self.shape[0] + 1))
-        return np.ascontiguousarray(sums.reshape(parts.components, -1)[:, :-1])
+        return np.take(self._added(integrals), self.free, axis=1)
 
     def assembled(self, integrals: Sequence[Array]) -> Array:
-        """Return the integrals (c, count) of all coefficients, copies added."""
-        parts = self.layout.joined(integrals)
-        rows = self.layout.numbers(self.numbers, parts.components, self.count)
-        sums = np.bincount(rows, parts.flat, parts.components * self.count).astype(np.float64, copy=False)
-        return sums.reshape(parts.components, -1)
+        """Return the integrals (c, size) of all coefficients, copies added."""
+        sums = self._added(integrals)
+        self.fill(sums)
+        return sums
+
+    def _added(self, integrals: Sequence[Array]) -> Array:
+        """Return the integrals (c, size) of all coefficients; copies are added to own ones alone."""
+        parts, size = self.layout.joined(integrals), len(self.fixed)
+        counted = np.bincount(self._entries(parts.components), parts.flat, parts.components * size)
+        sums = counted.astype(np.float64, copy=False).reshape(parts.components, size)
+        self.add(sums)
+        return sums
 
     def chosen(self, coefficients: Sequence[Array]) -> Array:
         """Return the vector (c, m) of the coefficients of a function that is continuous across interfaces."""
         parts = self.layout.joined(coefficients)
-        padded = np.zeros((parts.components, self.shape[0] + 1))
-        padded.ravel()[self._entries(parts.components)] = parts.flat
-        return padded[:, :-1].copy()
+        every = np.zeros((parts.components, len(self.fixed)))
+        every.ravel()[self._entries(parts.components)] = parts.flat
+        return np.take(every, self.free, axis=1)
 
     def _entries(self, components: int) -> IntArray:
-        """Return the place of each entry of an array of all patches in a vector (c, m + 1); m is that of fixed ones."""
+        """Return the place of each entry of an array of all patches in an array (c, size)."""
         if components not in self._known_entries:
-            entries = self.layout.numbers(self.places, components, self.shape[0] + 1)
+            entries = self.layout.numbers(self.numbers, components, len(self.fixed))
             self._known_entries[components] = entries
         return self._known_entries[components]
 
@@ -240,9 +270,9 @@ class Glued:
         return {}
 
     @cached_property
-    def owned(self) -> list[Mask]:
+    def first_to_fix(self) -> list[Mask]:
         """Return for each patch the mask (n_u, n_v, n_w) of the coefficients that its data are the first to fix."""
-        taken, found = np.zeros(self.count, dtype=bool), []
+        taken, found = np.zeros(len(self.fixed), dtype=bool), []
         for space, own in zip(self.spaces, self.numbers, strict=True):
             given = ~taken[own]
             given[space.free] = False
@@ -260,15 +290,17 @@ class Glued:
         A coefficient has the value of the first patch whose data fix it: other patches may touch a Dirichlet face along
         an edge only.
         """
-        every = np.zeros((len(known[0]), self.count))
-        for own, is_owned, values in zip(self.numbers, self.owned, known, strict=True):
-            every[:, own[is_owned]] = values[:, is_owned]
+        every = np.zeros((len(known[0]), len(self.fixed)))
+        for own, is_first, values in zip(self.numbers, self.first_to_fix, known, strict=True):
+            every[:, own[is_first]] = values[:, is_first]
+        self.add(every)  # others have zero
+        self.fill(every)
         return [every[:, own] for own in self.numbers]
 
     def on_fixed(self, integrals: Sequence[Array]) -> list[Array]:
         """Return integrals of fixed coefficients, summed over all patches, in the first patch whose data fix them."""
         total = self.assembled(integrals)
-        return [total[:, own] * is_owned for own, is_owned in zip(self.numbers, self.owned, strict=True)]
+        return [total[:, own] * is_first for own, is_first in zip(self.numbers, self.first_to_fix, strict=True)]
 
     @property
     def place(self) -> slice:

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 from coarse_rims import coarse_rims
+from cube_grids import plate, two
 from rational_shapes import quarter_ring
 from volumes import mapped
 
@@ -34,7 +35,7 @@ class Wind(Form):
 
 
 def cases():
-    """Name -> volume, problem and keywords; u has 8 spans, or 4, or 3, or 2."""
+    """Name -> volume or body, problem and keywords; u has 8 spans, or 4, or 3, or 2; bodies have 8 patches."""
     n4, n3, n2 = (benchmark_volume(spans) for spans in (4, 3, 2))
     mixed = Poisson(
         exact=WAVE,
@@ -49,6 +50,11 @@ def cases():
         fix={"nx < -0.5 and y < 0.2": None}, roller="nz > 0.5 and x > 0.4", load={"ny > 0.5": (1, 0, "x")}
     )
     cut = Poisson(exact=WAVE, value="x + z < 0.7", exchange={"ny > 0.5": ("2", None)})
+    ring, first = plate(2), plate(1)
+    begun = solve_problem(first, Poisson(exact=WAVE), threads=1)
+    bent = Elasticity(fix={"nx < -0.5 and y < 1.2": None}, load={"ny > 0.5": (1, 0, "x")}, spring={"nz < -0.5": "2"})
+    two_values = Poisson(source="x", value={"nx > 0.5 and y > 0.7": "y"}, exchange={"nz > 0.5": ("2", "z")})
+    faces = Poisson(source="1", value={"p0_u0": "y", "p7_v1": "x"}, exchange={"p3_w1": ("2", "1")})
     sheared = mapped(lambda u, v, w: (u + 3.0 * v, v, w + 1.5 * u))
     return {
         "poisson": (n4, Poisson(exact=WAVE), {"refine": 1}),
@@ -63,16 +69,35 @@ def cases():
         "held": (n4, held, {"tolerance": 1e-13, "degree": 2}),
         "cut": (n4, cut, {"tolerance": 1e-13}),
         "wind": (n3, Problem(Wind(), exact=WAVE), {}),
+        "plate": (first, Poisson(exact=WAVE), {"refine": 1, "start": begun}),
+        "plate with faces": (ring, faces, {"tolerance": 1e-13}),
+        "plate with regions": (ring, two_values, {"tolerance": 1e-13}),
+        "open plate": (ring, Poisson(exact=WAVE, neumann=dict.fromkeys(FACE_NAMES)), {"tolerance": 1e-13}),
+        "bent plate": (ring, bent, {"tolerance": 1e-13, "degree": 2}),
+        "windy plate": (first, Problem(Wind(), exact=WAVE), {"tolerance": 1e-13}),
     }
 
 
-def refused(comm):
+def refused(comm, body):
     """Return how many processes say that kappa is negative, as it is for some of them."""
     try:
-        solve_problem(benchmark_volume(4), Poisson(source="1", kappa="x-0.5"), comm=comm)
+        solve_problem(body, Poisson(source="1", kappa="x-0.5"), comm=comm)
     except ExpressionError as error:
         return sum(comm.allgather("kappa must be positive" in str(error)))
     return 0
+
+
+def too_many(comm):
+    """Return how many processes say that two patches are too few for them."""
+    try:
+        solve_problem(two(), Poisson(source="1"), comm=comm)
+    except ValueError as error:
+        return sum(comm.allgather(f"patches: 2, processes: {comm.size}" in str(error)))
+    return 0
+
+
+def all_coefficients(solution):
+    return np.concatenate([patch.coefficients.ravel() for patch in solution.patches])
 
 
 def groups(ranks):
@@ -98,10 +123,11 @@ def solve_all(comm, folder):
     for name, (volume, problem, how) in cases().items():
         solution = solve_problem(volume, problem, comm=comm, **how)
         found[name] = solution.report.as_dict() | {"ranks": comm.size}
-        assert len(set(comm.allgather(solution.coefficients.tobytes()))) == 1
+        coefficients = all_coefficients(solution)
+        assert len(set(comm.allgather(coefficients.tobytes()))) == 1
         if comm.rank == 0:
-            np.save(folder / f"{name}.npy", solution.coefficients)
-    found["refused"] = refused(comm)
+            np.save(folder / f"{name}.npy", coefficients)
+    found["refused"] = [refused(comm, benchmark_volume(4)), refused(comm, plate(1)), too_many(comm)]
     if comm.rank == 0:
         (folder / "found.json").write_text(json.dumps(found))
 
