@@ -28,12 +28,12 @@ Link = tuple[int, IntArray]  # another process, and the numbers of some coeffici
 class Parted(Glued):
     """Number the unknowns of the patches of one process; the attributes of Glued are those of these patches.
 
-    of_body: the unknowns of the body. owners: (patches,), the process of each patch of the body. messenger: passes
+    whole_body: the unknowns of the body. owners: (patches,), the process of each patch of the body. messenger: passes
     messages. held: (size,), the number of each coefficient in the body. own: the other processes with copies of own
     coefficients. copies: the owners of the copies here.
     """
 
-    of_body: Glued
+    whole_body: Glued
     owners: IntArray
     messenger: Messenger
     held: IntArray
@@ -57,7 +57,7 @@ class Parted(Glued):
             numbers=tuple(place[whole.numbers[i]] for i in here),
             count=whole.count,
             fixed=whole.fixed[holds[rank]],
-            of_body=whole,
+            whole_body=whole,
             owners=owners,
             messenger=messenger,
             held=np.flatnonzero(holds[rank]),
@@ -89,12 +89,41 @@ class Parted(Glued):
     @cached_property
     def first_to_fix(self) -> list[Mask]:
         """Return for each patch the mask of the coefficients that its data are the first to fix in the body."""
-        return [self.of_body.first_to_fix[number] for number in self.patches]
+        return [self.whole_body.first_to_fix[number] for number in self.patches]
 
     @property
-    def names(self) -> IntArray:
-        """Return the number (size,) of each coefficient in the body."""
-        return self.held
+    def of_body(self) -> Glued:
+        """Return the unknowns of the body that processes share."""
+        return self.whole_body
+
+    @cached_property
+    def alone(self) -> Glued:
+        """Return the unknowns of the patches of this process, as if it were the only one."""
+        return Glued(self.spaces, self.numbers, len(self.fixed), self.fixed)
+
+    @property
+    def rows(self) -> IntArray:
+        """Return where the vector of `alone` stands in a vector of the body."""
+        return np.searchsorted(self.whole_body.free, self.held[self.alone.free])
+
+    @property
+    def own_rows(self) -> IntArray:
+        """Return where the vector of this process stands in a vector of the body."""
+        return np.searchsorted(self.whole_body.free, self.held[self.free])
+
+    def with_copies(self, x: Array) -> Array:
+        """Return the vector (k, c) of `alone` that has the values of a vector (m, c)."""
+        every = np.zeros((x.shape[1], len(self.fixed)))
+        every[:, self.free] = x.T
+        self.fill(every)
+        return np.ascontiguousarray(every[:, self.alone.free].T)
+
+    def without_copies(self, integrals: Array) -> Array:
+        """Return the vector (m, c) of integrals (k, c) in the vector of `alone`, copies added."""
+        every = np.zeros((integrals.shape[1], len(self.fixed)))
+        every[:, self.alone.free] = integrals.T
+        self.add(every)
+        return np.ascontiguousarray(every[:, self.free].T)
 
     def fill(self, coefficients: Array) -> None:
         """Overwrite the copies among coefficients (c, size) by the values of their owners."""
@@ -128,7 +157,7 @@ class Parted(Glued):
         """Return the coefficients (c, n_u, n_v, n_w) of every patch of the body from those of this process."""
         own, found = self.layout.joined(coefficients), [np.empty(0)] * len(self.owners)
         numbers = list(map(self._patches_of, range(int(self.owners.max()) + 1)))
-        layouts = [Layout.of([self.of_body.spaces[number] for number in part]) for part in numbers]
+        layouts = [Layout.of([self.whole_body.spaces[number] for number in part]) for part in numbers]
         sizes = [own.components * int(layout.starts[-1]) for layout in layouts]
         each = np.split(self.messenger.gather(own.flat, sizes), np.cumsum(sizes)[:-1])
         for part, layout, flat in zip(numbers, layouts, each, strict=True):

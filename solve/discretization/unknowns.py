@@ -194,9 +194,32 @@ class Glued:
         return self.free.shape
 
     @property
-    def names(self) -> IntArray:
-        """Return the number (size,) of each coefficient in the body."""
-        return np.arange(self.count)
+    def of_body(self) -> "Glued":
+        """Return the unknowns of the body that processes share."""
+        return self
+
+    @property
+    def alone(self) -> "Glued":
+        """Return the unknowns of the patches of this process, as if it were the only one."""
+        return self
+
+    @property
+    def rows(self) -> slice | IntArray:
+        """Return where the vector of `alone` stands in a vector of the body."""
+        return slice(None)
+
+    @property
+    def own_rows(self) -> slice | IntArray:
+        """Return where the vector of this process stands in a vector of the body."""
+        return slice(None)
+
+    def with_copies(self, x: Array) -> Array:
+        """Return the vector (k, c) of `alone` that has the values of a vector (m, c)."""
+        return x
+
+    def without_copies(self, integrals: Array) -> Array:
+        """Return the vector (m, c) of integrals (k, c) in the vector of `alone`, copies added."""
+        return integrals
 
     @property
     def is_own(self) -> Mask | bool:

@@ -39,12 +39,7 @@ class Grid:
     @classmethod
     def of(cls, body: Body, unknowns: Glued) -> "Grid":
         """Return the grid of the Greville points of a body's unknowns."""
-        spaces = [
-            linear(space, [nodes(*row) for row in zip(space.knots, space.degrees, strict=True)])
-            for space in unknowns.spaces
-        ]
-        found = Glued(tuple(spaces), unknowns.numbers, unknowns.count, unknowns.fixed)
-        return cls(body, found, _lengths(body), _tied(body))
+        return cls(body, on_nodes(unknowns), _lengths(body), _tied(body))
 
     @property
     def count(self) -> int:
@@ -104,6 +99,15 @@ class Grid:
         row, column = row[free], column[free]
         entries = value[free] / copies[row], (row, column)
         return coo_array(entries, shape=(self.count, coarser.count)).tocsr()
+
+
+def on_nodes(unknowns: Glued) -> Glued:
+    """Return the unknowns of trilinear functions on the Greville points of the patches."""
+    spaces = [
+        linear(space, [nodes(*row) for row in zip(space.knots, space.degrees, strict=True)])
+        for space in unknowns.spaces
+    ]
+    return Glued(tuple(spaces), unknowns.numbers, unknowns.count, unknowns.fixed)
 
 
 def _between(fine: TrialSpace, coarse: TrialSpace) -> coo_array:

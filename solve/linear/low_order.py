@@ -22,7 +22,7 @@ from ..discretization.groups import Layout, OnPatches
 from ..discretization.operator import diagonals
 from ..discretization.quadrature import GaussRule, gauss_rule
 from ..discretization.unknowns import Glued
-from .grids import Grid
+from .grids import Grid, on_nodes
 from .multigrid import Multigrid
 from .nodal import NodalBasis
 from .preconditioner import NO_FACTORS, leaves_constants
@@ -54,10 +54,10 @@ class LowOrder:
     @classmethod
     def of(cls, body: Body, unknowns: Glued, matrix: BodyMatrix, survey: Survey, is_loose: bool) -> "LowOrder":
         """Return the preconditioner of a matrix on a body. is_loose: whether motions may be free."""
-        is_open = bool(survey.free.all())
+        is_open = all(unknowns.processes.shared(bool(survey.free.all())))
         with np.errstate(all="ignore"):  # it is looked at afterwards
-            grid, diagonal = Grid.of(body, unknowns), unknowns.collect(survey.diagonal)
-            cycle = Multigrid.of(grid, trilinear(grid.unknowns, matrix), is_open or is_loose)
+            grid, diagonal = Grid.of(body, unknowns.of_body), unknowns.collect(survey.diagonal)
+            cycle = Multigrid.of(grid, unknowns, trilinear(on_nodes(unknowns.alone), matrix), is_open or is_loose)
             local = np.divide(1.0, np.abs(diagonal), out=np.zeros_like(diagonal), where=diagonal != 0.0)
             found = cls(NodalBasis.of(unknowns), cycle, LOCAL * local, is_open)
             return found if found._is_usable() else cls(found.basis, None, local, is_open)
@@ -68,7 +68,10 @@ class LowOrder:
         found = self.local * given
         if self.cycle is not None:
             found += self.basis.coefficients(self.cycle(self.basis.integrals(given)))
-        return (found - found.mean() if self.is_open else found).reshape(residual.shape)
+        if self.is_open:
+            total = self.basis.unknowns.processes.total
+            found -= total(found.sum()) / total(found.size)
+        return found.reshape(residual.shape)
 
     @property
     def weakness(self) -> str:
@@ -76,7 +79,8 @@ class LowOrder:
         return "" if self.cycle is not None else NO_FACTORS
 
     def _is_usable(self) -> bool:
-        return bool(np.isfinite(self(np.random.default_rng(0).uniform(-1.0, 1.0, self.local.shape))).all())
+        found = self(np.random.default_rng(0).uniform(-1.0, 1.0, self.local.shape))
+        return all(self.basis.unknowns.processes.shared(bool(np.isfinite(found).all())))
 
 
 def trilinear(nodes: Glued, matrix: BodyMatrix) -> bsr_array:

@@ -4,14 +4,16 @@ Matrices of coarser grids are Galerkin's, smoothers Chebyshev polynomials of the
 (Adams, Brezina, Hu, Tuminaro, J. Comput. Phys. 188, 2003). On the coarsest grid a factor solves.
 """
 
+import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.sparse import bsr_array, csr_array, kron
 
 from parameterize.arrays import Array
 
+from ..discretization.unknowns import Glued
 from .direct import factorized
 from .grids import Grid
 
@@ -27,25 +29,39 @@ OPEN = 1e-8  # share of the diagonal that is added to the coarsest matrix of a b
 class Level:
     """Smooth on one grid. Vectors have the shape (m, c), for c components.
 
-    matrix: (m c, m c) in blocks of c. inverses: (m, c, c), those of its diagonal blocks. largest: a bound on the
-    eigenvalues of the matrix with inverted diagonal blocks. coarser: (m, coarser m), the interpolation.
+    unknowns: those of this process. matrix: (k c, k c) in blocks of c, the part of the patches here. inverses: (m, c,
+    c), those of its diagonal blocks. largest: a bound on the eigenvalues of the matrix with inverted diagonal blocks.
+    coarser: (m, coarser m), the interpolation.
     """
 
+    unknowns: Glued
     matrix: bsr_array
     inverses: Array
     largest: float
     coarser: csr_array
 
     @classmethod
-    def of(cls, matrix: bsr_array, coarser: csr_array) -> "Level":
-        """Return the level of a matrix."""
-        inverses = _inverted(_diagonal(matrix))
-        x = np.random.default_rng(0).standard_normal(inverses.shape[:2])
+    def of(cls, unknowns: Glued, matrix: bsr_array, coarser: csr_array) -> "Level":
+        """Return the level of a matrix; coarser: the interpolation to all unknowns of the body."""
+        diagonal = _diagonal(matrix)
+        own = unknowns.without_copies(diagonal.reshape(len(diagonal), -1))
+        inverses = _inverted(own.reshape(len(own), *diagonal.shape[1:]))
+        found = cls(unknowns, matrix, inverses, 1.0, coarser[unknowns.own_rows])
+        x = np.random.default_rng(0).standard_normal((coarser.shape[0], inverses.shape[1]))[unknowns.own_rows]
         largest = 1.0
         for _ in range(POWERS):
-            x = _blocks(inverses, _product(matrix, x / largest))
-            largest = float(np.linalg.norm(x))
-        return cls(matrix, inverses, MARGIN * largest, coarser)
+            x = _blocks(inverses, found.product(x / largest))
+            largest = math.sqrt(unknowns.processes.total(float(np.square(x).sum())))
+        return replace(found, largest=MARGIN * largest)
+
+    def product(self, x: Array) -> Array:
+        """Return the matrix times x."""
+        copied = self.unknowns.with_copies(x)
+        return self.unknowns.without_copies(np.asarray(self.matrix @ copied.ravel()).reshape(copied.shape))
+
+    def restricted(self, residual: Array) -> Array:
+        """Return the residual on the next coarser grid, which all processes have whole."""
+        return np.asarray(self.unknowns.processes.total(self.coarser.T @ residual))
 
     def smooth(self, x: Array | None, residual: Array, is_last: bool = False) -> tuple[Array, Array]:
         """Return x after some steps, zero at first where it is None, and its residual, an earlier one if `is_last`."""
@@ -56,7 +72,7 @@ class Level:
             x = step if x is None else x + step
             if is_last and number == STEPS - 1:
                 break
-            residual = residual - _product(self.matrix, step)
+            residual = residual - self.product(step)
             if number < STEPS - 1:
                 following = 1.0 / (2.0 * middle / half - rho)
                 step = following * rho * step + 2.0 * following / half * _blocks(self.inverses, residual)
@@ -76,17 +92,25 @@ class Multigrid:
     coarsest: Callable[[Array], Array]
 
     @classmethod
-    def of(cls, grid: Grid, matrix: bsr_array, is_open: bool) -> "Multigrid | None":
+    def of(cls, grid: Grid, unknowns: Glued, matrix: bsr_array, is_open: bool) -> "Multigrid | None":
         """Return the multigrid of a matrix on a grid; None where the coarsest matrix has no factor.
 
-        is_open: whether motions of the body may cost no energy.
+        unknowns: those of this process, to whose patches the matrix belongs. All processes have the coarser grids
+        whole, also one that is no coarser where the first has few nodes. is_open: whether motions of the body may cost
+        no energy.
         """
-        levels = []
-        while grid.count > SMALL and (coarser := grid.coarser()) is not None:
-            levels.append(Level.of(matrix, grid.interpolation(coarser)))
-            wide = kron(levels[-1].coarser, np.eye(matrix.blocksize[0]), format="bsr")
-            matrix = bsr_array(wide.T @ matrix @ wide, blocksize=matrix.blocksize)
-            grid = coarser
+        levels: list[Level] = []
+        is_shared = unknowns.of_body is not unknowns
+        while grid.count > SMALL or (is_shared and not levels):
+            coarser = grid.coarser() if grid.count > SMALL else None
+            if coarser is None and (levels or not is_shared):
+                break
+            coarser = coarser or grid
+            interpolation = grid.interpolation(coarser)
+            levels.append(Level.of(unknowns, matrix, interpolation))
+            wide = kron(interpolation[unknowns.rows], np.eye(matrix.blocksize[0]), format="bsr")
+            coarse = unknowns.processes.total(wide.T @ matrix @ wide)
+            matrix, grid, unknowns = bsr_array(coarse, blocksize=matrix.blocksize), coarser, coarser.unknowns
         solve = _factor(grid, matrix, is_open)
         return None if solve is None else cls(levels, solve)
 
@@ -95,11 +119,11 @@ class Multigrid:
         part, kept = np.ascontiguousarray(residual.T), []
         for level in self.levels:
             kept.append(level.smooth(None, part))
-            part = level.coarser.T @ kept[-1][1]
+            part = level.restricted(kept[-1][1])
         x = self.coarsest(part)
         for level, (own, rest) in zip(reversed(self.levels), reversed(kept), strict=True):
             step = level.coarser @ x
-            x, _ = level.smooth(own + step, rest - _product(level.matrix, step), is_last=True)
+            x, _ = level.smooth(own + step, rest - level.product(step), is_last=True)
         return np.ascontiguousarray(x.T)
 
 
@@ -111,10 +135,6 @@ def _factor(grid: Grid, matrix: bsr_array, is_open: bool) -> Callable[[Array], A
     turned = np.arange(c * grid.count).reshape(-1, c).T.ravel()
     solve = factorized(matrix.tocsr()[turned][:, turned].tocsc(), grid.points, OPEN if is_open else 0.0)
     return solve and (lambda x: solve(x.T.ravel()[:, None]).reshape(c, -1).T.copy())
-
-
-def _product(matrix: bsr_array, x: Array) -> Array:
-    return np.asarray(matrix @ x.ravel()).reshape(x.shape)
 
 
 def _blocks(inverses: Array, x: Array) -> Array:
