@@ -222,7 +222,7 @@ def tell_memory(body: BodyLike, problem: BoundaryValueProblem, options: SolveOpt
     if free is None or needed <= free:
         return
     spans = len(trial_space(as_body(body).patches[0], options.refine, options.degree).breaks[0]) - 1
-    most = spans if as_body(body).is_single else processes  # several patches are solved by one process
+    most = spans if as_body(body).is_single else len(as_body(body))
     enough = next((count for count in range(processes + 1, most + 1) if wanted.on(count) <= free), None)
     more = f", or take {enough} processes with as much memory each: mpiexec -n {enough} iga-nn solve .. --mpi"
     log.warning(
