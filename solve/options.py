@@ -10,7 +10,6 @@ from parameterize.threads import default_threads
 
 from .field import FieldOnBody
 from .forms.boundary_value_problem import BoundaryValueProblem
-from .forms.poisson import Poisson
 
 DEVICES = ("cpu", "cuda")
 FORMULATIONS = ("mixed", "displacement")
@@ -82,12 +81,12 @@ def check_device(device: str, problem: BoundaryValueProblem) -> None:
     if device not in DEVICES:
         raise ValueError(f"device must be one of {', '.join(DEVICES)}, got {device!r}")
     if device != "cpu":
-        if not isinstance(problem, Poisson):
-            raise ValueError(f"{type(problem).__name__.lower()} runs on device='cpu' only, got device={device!r}")
-        if any(condition.factor is not None for condition in problem.faces):
-            raise ValueError(f"Robin faces run on device='cpu' only, got device={device!r}")
-        if problem.conditions:
-            raise ValueError(f"regions run on device='cpu' only, got device={device!r}")
+        form = problem.form
+        if not form.symmetric or (form.components > 1 and not form.constant):
+            raise ValueError(
+                f"{type(form).__name__} is solved on device='cpu' only, got device={device!r}: on a GPU laws are "
+                "symmetric, and those of several components constant"
+            )
         from .linear.cuda import check_available  # torch comes in here only
 
         check_available(device)

@@ -203,8 +203,8 @@ class System:
     def solve_with(self, options: IterationOptions) -> Solution:
         """Return the solution of `solve` for options in one object."""
         check_device(options.device, self.problem)
-        if not self.body.is_single and options.device != "cpu":
-            raise ValueError(f"several patches are solved on device='cpu' only, got device={options.device!r}")
+        if options.device != "cpu" and len(self.unknowns.processes.shared(None)) > 1:
+            raise ValueError(f"several processes solve on device='cpu' only, got device={options.device!r}")
         with one_blas_thread():
             solution = self._solve(options)
         for notice in solution.report.notices if self.unknowns.processes.rank == 0 else ():
@@ -339,9 +339,8 @@ class System:
         if options.device != "cpu":
             from .linear.cuda import solve_on_device
 
-            operator = self.patches[0].matrix
-            assert isinstance(operator, Operator) and isinstance(self.inverse, Componentwise)
-            return solve_on_device(operator, self.inverse.blocks[0], self.right, *limits, options.device, guess)
+            whole = self.unknowns, self.matrix, self.inverse, self.right
+            return solve_on_device(*whole, *limits, options.device, guess)
         if self.problem.form.symmetric:
             processes = self.unknowns.processes
             system = _Told(self.product, processes.rank == 0), self.right, self.precondition

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from cube_grids import row_of
 
 import iga_nn
 from solve.discretization.error_norms import Compared, error_norms
@@ -13,18 +14,6 @@ from solve.discretization.space import trial_space
 from solve.linear.preconditioner import fast_diagonalization
 from solve.linear.stacked import diagonalizations
 from solve.patch_system import operators_of
-
-
-def row_of(counts, degree=2):
-    """Return a row of blocks along x, one for each number of control points along x."""
-    return iga_nn.Body.from_patches(
-        [
-            iga_nn.BSplineVolume.from_function(
-                lambda u, v, w, a=a: (a + u + 0.1 * np.sin(3 * v) * w, v, w + 0.1 * u * v), (count, 4, 3), degree
-            )
-            for a, count in enumerate(counts)
-        ]
-    )
 
 
 def test_patches_of_one_shape_stand_side_by_side():

@@ -115,9 +115,12 @@ class BodyMatrix:
 
     @cached_property
     def _of_faces(self) -> csr_array:
-        """Return the matrix of the terms on faces of the patches in stacks, of all coefficients as one vector."""
-        components, starts, alone = self.laws[0].form.components, self.layout.starts, set(self.alone)
-        terms = [(i, face) for i, own in enumerate(self.parts) if i not in alone for face in own.faces.values()]
+        return self.faces_of(sorted(set(range(len(self.parts))) - set(self.alone)))
+
+    def faces_of(self, patches: Sequence[int]) -> csr_array:
+        """Return the matrix of the terms on faces of some patches, of all coefficients of all patches as one vector."""
+        components, starts = self.laws[0].form.components, self.layout.starts
+        terms = [(i, face) for i in patches for face in self.parts[i].faces.values()]
         found = [(components * starts[i], face.matrix((components, *self.layout.shapes[i]))) for i, face in terms]
         rows, columns = (
             np.concatenate([np.zeros(0, dtype=np.int64), *(first + own.coords[axis] for first, own in found)])

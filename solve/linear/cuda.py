@@ -1,24 +1,28 @@
-"""Solves the linear system on torch tensors, on a GPU or, for tests, on the CPU: operator, preconditioner, iteration.
+"""Solves the linear system on torch tensors, on a GPU or, for tests, on the CPU: unknowns, preconditioner, iteration.
 
-A CPU profits from the fact that few functions are nonzero at a point; a GPU profits from large matrix products: here
-the bases of directions v and w are dense matrices, and direction u is processed layer by layer. All numbers are in
-double precision. Geometry factors and load come from `operator.assemble` on the CPU.
+The preconditioners are those of the CPU with tensors in place of arrays: what their loops do is the same. The coarsest
+grid of a multigrid is solved on the CPU by its sparse factor.
 """
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import torch
+from scipy.sparse import csr_array
 from torch import Tensor
 
 from parameterize.arrays import Array
 from parameterize.conjugate_gradients import LinearResult, conjugate_gradients
 
-from ..discretization.operator import Operator
-from .preconditioner import FastDiagonalization
-
-LAYER_BYTES = 2**28  # of one field on a layer of points of u
+from ..discretization.grouped import BodyMatrix
+from ..discretization.groups import OnPatches
+from ..discretization.unknowns import Glued, Unknowns, Window
+from .device_matrix import DeviceMatrix, on_device, sparse
+from .low_order import LowOrder
+from .multigrid import Level, Multigrid
+from .preconditioner import Componentwise, FastDiagonalization
 
 
 def check_available(device: str) -> None:
@@ -28,73 +32,75 @@ def check_available(device: str) -> None:
 
 
 def solve_on_device(
-    operator: Operator,
-    preconditioner: FastDiagonalization,
+    unknowns: Unknowns,
+    matrix: BodyMatrix,
+    inverse: Componentwise | LowOrder,
     right: Array,
     tolerance: float,
     max_iterations: int,
     device: str,
     start: Array | None = None,
 ) -> LinearResult:
-    """Return the result of `conjugate_gradients` for an operator's free coefficients, computed on a torch device."""
-    b, first = (None if x is None else torch.as_tensor(np.ascontiguousarray(x), device=device) for x in (right, start))
-    inverse = device_preconditioner(preconditioner, device)
+    """Return the result of `conjugate_gradients` for the free unknowns (c, ...) of a body, computed on a torch device.
+
+    Raises ValueError for a law whose flux is called at the points.
+    """
+    b, first = (None if x is None else on_device(x, device) for x in (right, start))
+    there, product = DeviceUnknowns(unknowns, len(right), device), DeviceMatrix(matrix, device)
     found = conjugate_gradients(
-        DeviceOperator(operator, device).apply_free, b, inverse, tolerance, max_iterations, first
+        lambda x: there.collect(product.apply(there.spread(x))).reshape(x.shape),
+        b,
+        device_preconditioner(inverse, there, device),
+        tolerance,
+        max_iterations,
+        first,
     )
     return replace(found, x=found.x.cpu().numpy())
 
 
-class DeviceOperator:
-    """Apply the operator with its factors as a tensor on a device."""
+class DeviceUnknowns:
+    """Spread vectors to the coefficients of patches, and collect integrals, as `Glued` does, with tensors."""
 
-    def __init__(self, operator: Operator, device: str) -> None:
-        self._window, self._shape = operator.space.window, operator.space.shape
-        self._factors = torch.as_tensor(operator.factors, device=device)
-        self._u, self._v, self._w = (
-            [torch.as_tensor(operator.dense(axis, d), device=device) for d in (0, 1)] for axis in range(3)
-        )
-        q_u, _, q_w, q_v = operator.factors.shape
-        first, values, _ = operator.tables[0]
-        last = first + values.shape[2]
-        step = max(1, LAYER_BYTES // (8 * q_v * q_w))
-        self._layers = [
-            (slice(q, min(q + step, q_u)), slice(int(first[q]), int(last[min(q + step, q_u) - 1])))
-            for q in range(0, q_u, step)
-        ]
+    def __init__(self, unknowns: Unknowns, components: int, device: str) -> None:
+        glued = Glued.of([unknowns.space], ()) if isinstance(unknowns, Window) else unknowns
+        assert isinstance(glued, Glued)
+        self.layout, self._components = glued.layout, components
+        (count,) = glued.shape
+        component, place = np.divmod(self.layout.numbers(glued.places, components, count + 1), count + 1)
+        entries = np.where(place < count, component * count + place, components * count)
+        free = np.flatnonzero(place < count)
+        ones = np.ones(len(free)), (entries[free], free)
+        sums = csr_array(ones, shape=(components * count, len(entries)))
+        self._entries, self._sums = on_device(entries, device), sparse(sums, device)
+        self._firsts = on_device(sums.indices[sums.indptr[:-1]], device)
 
-    def apply_free(self, free: Tensor) -> Tensor:
-        """Return the product restricted to the free coefficients, a tensor of their shape."""
-        full = free.new_zeros(self._shape)
-        full[self._window] = free
-        result = torch.zeros_like(full)
-        for points, functions in self._layers:
-            self._add_layer(full, points, functions, result)
-        return result[self._window]
+    def spread(self, x: Tensor) -> Any:
+        """Return the coefficients of each patch of a vector (c, ...), parts of a tensor, zero where they are fixed."""
+        return self._on_patches(torch.cat([x.reshape(-1), x.new_zeros(1)])[self._entries])
 
-    def _add_layer(self, x: Tensor, points: slice, functions: slice, result: Tensor) -> None:
-        """Add the part of some points of u, at which the given functions of u are not zero, to the product."""
-        (b_v, d_v), (b_w, d_w) = self._v, self._w
-        b_u, d_u = (matrix[points, functions] for matrix in self._u)
-        planes, planes_u = (torch.tensordot(matrix, x[functions], 1) for matrix in (b_u, d_u))  # (q, n_v, n_w)
-        lines = b_w @ (b_v @ planes).mT  # (q, q_w, q_v), as all that follow
-        along = (b_w @ (b_v @ planes_u).mT, b_w @ (d_v @ planes).mT, d_w @ (b_v @ planes).mT)
-        uu, uv, uw, vv, vw, ww = self._factors[points, :6].unbind(1)
-        flux_u = uu * along[0] + uv * along[1] + uw * along[2]
-        flux_v = uv * along[0] + vv * along[1] + vw * along[2]
-        back = d_w.T @ (uw * along[0] + vw * along[1] + ww * along[2])  # (q, n_w, q_v)
-        if self._factors.shape[1] == 7:
-            back += b_w.T @ (self._factors[points, 6] * lines)
-        planes = (back @ b_v + b_w.T @ flux_v @ d_v).mT
-        planes_u = (b_w.T @ flux_u @ b_v).mT
-        result[functions] += torch.tensordot(b_u.T, planes, 1) + torch.tensordot(d_u.T, planes_u, 1)
+    def collect(self, integrals: OnPatches) -> Any:
+        """Return the vector (c, m) of integrals over each patch, copies added in one order."""
+        return (self._sums @ integrals.flat).reshape(self._components, -1)
+
+    def chosen(self, coefficients: OnPatches) -> Any:
+        """Return the vector (c, m) of the coefficients of a function that is continuous across interfaces."""
+        return coefficients.flat[self._firsts].reshape(self._components, -1)
+
+    def _on_patches(self, flat: Any) -> OnPatches:
+        return OnPatches(self.layout, self._components, flat)
 
 
-def device_preconditioner(preconditioner: FastDiagonalization, device: str) -> FastDiagonalization:
-    """Return fast diagonalization with tensors on a device."""
-    arrays = (*preconditioner.vectors, preconditioner.inverse, preconditioner.scaling)
-    u, v, w, inverse, scaling = (torch.as_tensor(part, device=device) for part in arrays)
-    return _OnDevice(preconditioner.space, (u, v, w), inverse, scaling, preconditioner.singular)  # type: ignore[arg-type]
+def device_preconditioner(inverse: Componentwise | LowOrder, unknowns: Any, device: str) -> Callable[[Tensor], Tensor]:
+    """Return a preconditioner of vectors (c, ...) with tensors on a device."""
+    if isinstance(inverse, LowOrder):
+        return _low_order(inverse, unknowns, device)  # type: ignore[return-value]  # of arrays and tensors alike
+    blocks = [_diagonalization(block, device) for block in inverse.blocks]
+    return lambda residual: torch.stack([block(part) for block, part in zip(blocks, residual, strict=True)])
+
+
+def _diagonalization(block: FastDiagonalization, device: str) -> Any:
+    u, v, w, inverse, scaling = (on_device(part, device) for part in (*block.vectors, block.inverse, block.scaling))
+    return _OnDevice(block.space, (u, v, w), inverse, scaling, block.singular)
 
 
 class _OnDevice(FastDiagonalization):
@@ -105,3 +111,38 @@ class _OnDevice(FastDiagonalization):
     def _across(self, v: Any, w: Any, x: Any, before: Any = None, after: Any = None) -> Any:
         result = (v @ (x if before is None else before * x)) @ w.T
         return result if after is None else after * result
+
+
+def _low_order(inverse: LowOrder, unknowns: Any, device: str) -> LowOrder:
+    factors = [tuple(on_device(part, device) for part in group) for group in inverse.basis.inverses]
+    basis: Any = replace(
+        inverse.basis, unknowns=unknowns, inverses=factors, copies=on_device(inverse.basis.copies, device)
+    )
+    cycle = inverse.cycle and _multigrid(inverse.cycle, device)
+    return replace(inverse, basis=basis, cycle=cycle, local=on_device(inverse.local, device))
+
+
+def _multigrid(cycle: Multigrid, device: str) -> Multigrid:
+    levels = [_level(level, device) for level in cycle.levels]
+    return Multigrid(levels, lambda x: on_device(cycle.coarsest(x.cpu().numpy()), device))  # type: ignore[attr-defined]
+
+
+def _level(level: Level, device: str) -> Level:
+    matrix: Any = sparse(level.matrix.tocsr(), device)
+    coarser: Any = _Interpolation(level.coarser, device)
+    return _DeviceLevel(matrix, on_device(level.inverses, device), level.largest, coarser)
+
+
+class _DeviceLevel(Level):
+    def relaxed(self, residual: Any) -> Any:
+        return (self.inverses @ residual[..., None])[..., 0]
+
+
+class _Interpolation:
+    """Multiply by a sparse matrix, and by its transpose `T`, both stored in rows."""
+
+    def __init__(self, matrix: csr_array, device: str) -> None:
+        self._rows, self.T = sparse(matrix, device), sparse(matrix.T.tocsr(), device)
+
+    def __matmul__(self, x: Tensor) -> Tensor:
+        return self._rows @ x

@@ -67,7 +67,7 @@ class Level:
         """Return x after some steps, zero at first where it is None, and its residual, an earlier one if `is_last`."""
         middle, half = self.largest * (1.0 + 1.0 / RANGE) / 2.0, self.largest * (1.0 - 1.0 / RANGE) / 2.0
         rho = half / middle
-        step = _blocks(self.inverses, residual) / middle
+        step = self.relaxed(residual) / middle
         for number in range(STEPS):
             x = step if x is None else x + step
             if is_last and number == STEPS - 1:
@@ -75,10 +75,14 @@ class Level:
             residual = residual - self.product(step)
             if number < STEPS - 1:
                 following = 1.0 / (2.0 * middle / half - rho)
-                step = following * rho * step + 2.0 * following / half * _blocks(self.inverses, residual)
+                step = following * rho * step + 2.0 * following / half * self.relaxed(residual)
                 rho = following
         assert x is not None
         return x, residual
+
+    def relaxed(self, residual: Array) -> Array:
+        """Return the inverted diagonal blocks times a residual."""
+        return _blocks(self.inverses, residual)
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,7 +120,7 @@ class Multigrid:
 
     def __call__(self, residual: Array) -> Array:
         """Return the approximate solution (c, m)."""
-        part, kept = np.ascontiguousarray(residual.T), []
+        part, kept = _turned(residual), []
         for level in self.levels:
             kept.append(level.smooth(None, part))
             part = level.restricted(kept[-1][1])
@@ -124,7 +128,7 @@ class Multigrid:
         for level, (own, rest) in zip(reversed(self.levels), reversed(kept), strict=True):
             step = level.coarser @ x
             x, _ = level.smooth(own + step, rest - level.product(step), is_last=True)
-        return np.ascontiguousarray(x.T)
+        return _turned(x)
 
 
 def _factor(grid: Grid, matrix: bsr_array, is_open: bool) -> Callable[[Array], Array] | None:
@@ -135,6 +139,11 @@ def _factor(grid: Grid, matrix: bsr_array, is_open: bool) -> Callable[[Array], A
     turned = np.arange(c * grid.count).reshape(-1, c).T.ravel()
     solve = factorized(matrix.tocsr()[turned][:, turned].tocsc(), grid.points, OPEN if is_open else 0.0)
     return solve and (lambda x: solve(x.T.ravel()[:, None]).reshape(c, -1).T.copy())
+
+
+def _turned(x: Array) -> Array:
+    """Return the transpose (m, c) of an array or a tensor (c, m), in C order."""
+    return x.T.reshape(-1).reshape(x.T.shape)
 
 
 def _blocks(inverses: Array, x: Array) -> Array:

@@ -56,7 +56,7 @@ def _applied(u: Array, v: Array, w: Array, x: Array) -> Array:
     count, c, n_u, n_v, n_w = x.shape
     x = x.reshape(count, c * n_u * n_v, n_w) @ w.swapaxes(1, 2)
     x = v[:, None] @ x.reshape(count, c * n_u, n_v, n_w)
-    return np.asarray((u[:, None] @ x.reshape(count, c, n_u, n_v * n_w)).reshape(count, c, n_u, n_v, n_w))
+    return (u[:, None] @ x.reshape(count, c, n_u, n_v * n_w)).reshape(count, c, n_u, n_v, n_w)
 
 
 def _inverses(spaces: Sequence[TrialSpace]) -> Factors:

@@ -51,3 +51,15 @@ def held_at(body: Body, face: str) -> dict[str, None]:
     """The exact flux on all outer faces but one."""
     labels = [f"p{i}_{name}" for i, faces in enumerate(body.outer) for name in faces]
     return {label: None for label in labels if label != face}
+
+
+def row_of(counts: tuple[int, ...], degree: int = 2) -> Body:
+    """Return a row of blocks along x, one for each number of control points along x."""
+    return Body.from_patches(
+        [
+            BSplineVolume.from_function(
+                lambda u, v, w, a=a: (a + u + 0.1 * np.sin(3 * v) * w, v, w + 0.1 * u * v), (count, 4, 3), degree
+            )
+            for a, count in enumerate(counts)
+        ]
+    )
