@@ -158,6 +158,8 @@ def _fault(problem: BoundaryValueProblem, patches: Sequence[PatchProblem], optio
         return f"the degree must be at least {LEAST_DEGREE}, got {least}"
     if options.comm is not None and options.comm.size > 1:
         return "one process solves it: leave comm out"
+    if options.device != "cpu":
+        return f"it is solved on device='cpu' only, got device={options.device!r}"
     return ""
 
 

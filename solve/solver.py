@@ -60,7 +60,8 @@ def solve_problem(body: BodyLike, problem: Poisson | Elasticity | Problem, **how
         Communicator whose processes share the work, by default with one thread each; each returns the whole solution.
     formulation : str, optional
         "mixed" solves for the displacement and the pressure of an elastic body, "displacement" for the former alone. By
-        default "mixed" where Poisson's ratio exceeds 0.45, the degree is at least 2, and one process does the work.
+        default "mixed" where Poisson's ratio exceeds 0.45, the degree is at least 2, and one process does the work
+        on the CPU.
     tolerance : float
         Tolerance of the residual, relative to the right-hand side; 1e-10 by default.
     max_iterations : int
@@ -68,7 +69,7 @@ def solve_problem(body: BodyLike, problem: Poisson | Elasticity | Problem, **how
     certified : str, optional
         Verdict of the map's certificate, if known; a verdict other than "certified" gives a notice.
     device : str
-        "cpu", or "cuda" for the iteration on a GPU (Poisson's equation without Robin faces).
+        "cpu", or "cuda" for the iteration on a GPU: for symmetric laws that are scalar or constant, in one process.
     start : SplineField or BodyField, optional
         Solution in a subspace, such as the space of one refinement less: the iteration starts there instead of at zero,
         which saves a third of the iterations on maps that need many.

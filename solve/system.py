@@ -202,9 +202,7 @@ class System:
 
     def solve_with(self, options: IterationOptions) -> Solution:
         """Return the solution of `solve` for options in one object."""
-        check_device(options.device, self.problem)
-        if options.device != "cpu" and len(self.unknowns.processes.shared(None)) > 1:
-            raise ValueError(f"several processes solve on device='cpu' only, got device={options.device!r}")
+        self._demand_device(options.device)
         with one_blas_thread():
             solution = self._solve(options)
         for notice in solution.report.notices if self.unknowns.processes.rank == 0 else ():
@@ -212,6 +210,14 @@ class System:
         if options.strict and not solution.report.converged:
             raise ConvergenceError(solution.report.notices[-1], solution)
         return solution
+
+    def _demand_device(self, device: str) -> None:
+        """Raise ValueError for a device that cannot solve the system."""
+        if device != "cpu" and self.formulation == "mixed":
+            raise ValueError(f"formulation 'mixed' is solved on device='cpu' only, got device={device!r}")
+        check_device(device, self.problem)
+        if device != "cpu" and len(self.unknowns.processes.shared(None)) > 1:
+            raise ValueError(f"several processes solve on device='cpu' only, got device={device!r}")
 
     def _solve(self, options: IterationOptions) -> Solution:
         problem, processes = self.problem, self.unknowns.processes

@@ -89,6 +89,12 @@ def test_a_law_that_is_called_at_the_points_is_refused():
         solve_on_device(system.unknowns, system.matrix, system.inverse, system.right, 1e-10, 10, "cpu")
 
 
+def test_a_mixed_system_is_refused():
+    law = iga_nn.Elasticity(exact=("x", "y", "z"), poisson_ratio=0.49)
+    with pytest.raises(ValueError, match="'mixed' is solved on device='cpu' only, got device='cuda'"):
+        iga_nn.discretize(benchmark_volume(2), law).solve(device="cuda")
+
+
 def test_a_law_that_is_not_symmetric_is_refused():
     class Wind(iga_nn.Form):
         symmetric = False

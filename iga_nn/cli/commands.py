@@ -153,7 +153,7 @@ def solve_problem(
     option names them.
 
     Args:
-        device: where the linear system is solved; cuda takes Poisson's equation alone.
+        device: where the linear system is solved; cuda takes symmetric laws that are scalar, or constant as elasticity.
     """
     from ..workflow import mpi_job, pipeline
 

@@ -230,7 +230,7 @@ def solve_to(
 ) -> Outcome | None:
     """Solve a problem on a saved volume and return the output folder with its report.
 
-    device: the device for Poisson's linear system, "cpu" or "cuda"; torch is not needed on the CPU. comm: a
+    device: the device for the linear system, "cpu" or "cuda"; torch is not needed on the CPU. comm: a
     communicator of mpi4py whose processes all call this function and share the solve; the first process writes the
     folder, the others return None. The other options and the errors are those of `run`.
     """

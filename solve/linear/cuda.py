@@ -64,7 +64,7 @@ class DeviceUnknowns:
     def __init__(self, unknowns: Unknowns, components: int, device: str) -> None:
         glued = Glued.of([unknowns.space], ()) if isinstance(unknowns, Window) else unknowns
         assert isinstance(glued, Glued)
-        self.layout, self._components = glued.layout, components
+        self.layout, self.processes, self._components = glued.layout, glued.processes, components
         (count,) = glued.shape
         component, place = np.divmod(self.layout.numbers(glued.places, components, count + 1), count + 1)
         entries = np.where(place < count, component * count + place, components * count)
@@ -130,10 +130,16 @@ def _multigrid(cycle: Multigrid, device: str) -> Multigrid:
 def _level(level: Level, device: str) -> Level:
     matrix: Any = sparse(level.matrix.tocsr(), device)
     coarser: Any = _Interpolation(level.coarser, device)
-    return _DeviceLevel(matrix, on_device(level.inverses, device), level.largest, coarser)
+    return _DeviceLevel(level.unknowns, matrix, on_device(level.inverses, device), level.largest, coarser)
 
 
 class _DeviceLevel(Level):
+    def product(self, x: Any) -> Any:
+        return (self.matrix @ x.reshape(-1)).reshape(x.shape)
+
+    def restricted(self, residual: Any) -> Any:
+        return self.coarser.T @ residual
+
     def relaxed(self, residual: Any) -> Any:
         return (self.inverses @ residual[..., None])[..., 0]
 

@@ -6,6 +6,7 @@ preconditioner is N^-1 K^-1 N^-T, with a multigrid cycle for K^-1, and a share o
 where the map bends within a span and K is too stiff (docs/solver.md).
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product
@@ -70,7 +71,7 @@ class LowOrder:
             found += self.basis.coefficients(self.cycle(self.basis.integrals(given)))
         if self.is_open:
             total = self.basis.unknowns.processes.total
-            found -= total(found.sum()) / total(found.size)
+            found -= total(found.sum()) / total(math.prod(found.shape))
         return found.reshape(residual.shape)
 
     @property
