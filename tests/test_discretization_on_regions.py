@@ -209,9 +209,9 @@ def test_scaled_regions_mean_the_same_in_other_units(coarse_regions):
 
 def test_a_region_of_the_cube_is_held_by_the_space_itself():
     strong = discretize(TWISTED, Poisson(exact=WAVE, value="u0 or w1"))
-    assert strong.space.dirichlet == ("u0", "w1")
+    assert strong.patches[0].space.dirichlet == ("u0", "w1")
     weak = discretize(TWISTED, Poisson(exact=WAVE, value="u0 and x > -9"))
-    assert weak.space.dirichlet == () and [*weak.patches[0].matrix.faces] == list(FACE_NAMES)
+    assert weak.patches[0].space.dirichlet == () and [*weak.patches[0].matrix.faces] == list(FACE_NAMES)
 
 
 def test_modes_of_a_body_on_rollers_leave_its_free_motions_out():
