@@ -1,4 +1,5 @@
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -93,6 +94,14 @@ def test_a_mixed_system_is_refused():
     law = iga_nn.Elasticity(exact=("x", "y", "z"), poisson_ratio=0.49)
     with pytest.raises(ValueError, match="'mixed' is solved on device='cpu' only, got device='cuda'"):
         iga_nn.discretize(benchmark_volume(2), law).solve(device="cuda")
+
+
+def test_several_processes_are_refused(monkeypatch):
+    monkeypatch.setattr("solve.system.check_device", lambda device, problem: None)  # as if there were a GPU
+    both = SimpleNamespace(processes=SimpleNamespace(shared=lambda value: [value, value]))
+    system = replace(iga_nn.discretize(benchmark_volume(2), Poisson(exact="x")), unknowns=both)
+    with pytest.raises(ValueError, match="several processes solve on device='cpu' only, got device='cuda'"):
+        system.solve(device="cuda")
 
 
 def test_a_law_that_is_not_symmetric_is_refused():
