@@ -6,6 +6,7 @@ the whole body: on a face values depend on the coefficients of the face alone, b
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 
@@ -80,7 +81,13 @@ def _values(knots: Array, degree: int) -> Array:
 
 def nodes(knots: Array, degree: int) -> Array:
     """Return the Greville points (n,), with the ends of the knot vector exactly."""
-    return np.asarray(np.clip(greville(knots, degree), knots[0], knots[-1]))
+    return _nodes(knots.tobytes(), degree)
+
+
+@lru_cache(maxsize=1024)
+def _nodes(knots: bytes, degree: int) -> Array:
+    row = np.frombuffer(knots)
+    return np.asarray(np.clip(greville(row, degree), row[0], row[-1]))
 
 
 def linear(space: TrialSpace, rows: Sequence[Array]) -> TrialSpace:
