@@ -7,6 +7,7 @@ from numbers import Integral
 from typing import Any
 
 import numpy as np
+from scipy.sparse import bsr_array
 
 from parameterize.arrays import Array, Mask
 from parameterize.conjugate_gradients import INDEFINITE, conjugate_gradients
@@ -21,7 +22,7 @@ from .discretization.groups import OnPatches
 from .discretization.nonlinear import Forces, Tangent
 from .discretization.on_regions import demand_area
 from .discretization.space import longest_edges
-from .discretization.unknowns import Unknowns, unknowns_of
+from .discretization.unknowns import Glued, Unknowns, unknowns_of
 from .discretization.weak import WeakFace
 from .field import FieldOnBody
 from .forms.boundary_value_problem import BoundaryValueProblem
@@ -29,12 +30,14 @@ from .forms.form import Form
 from .forms.problem import Problem
 from .forms.under_law import UnderLaw
 from .linear.krylov import generalized_residuals
+from .linear.low_order import entries_of, on_trilinear, survey_of
+from .linear.nodal import NodalBasis
 from .linear.preconditioner import leaves_constants
 from .options import SolveOptions
 from .patch_system import PatchProblem, operators_of
 from .solution import Solution, SolveReport
 from .solver import prepared
-from .system import coefficients_in, demand_fixed, field_of, preconditioners
+from .system import coefficients_in, demand_fixed, field_of, glued, preconditioner
 
 ENOUGH = 0.8  # share of the forces along a step that may be left at its end
 SHORTEST = 2.0**-12  # of a step
@@ -120,8 +123,8 @@ def newton(
     )
     if not (isinstance(load_steps, Integral) and load_steps >= 1):
         raise ValueError(f"load_steps must be a whole number, at least 1, got {load_steps!r:.80}")
-    glued = as_body(body)
-    placed, patches = prepared(glued, problem, options)
+    whole = as_body(body)
+    placed, patches = prepared(whole, problem, options)
     if weak := [c.role for c in problem.conditions if c.is_essential and not c.is_strong]:
         raise ValueError(f"{weak[0]}: newton holds all of u on whole faces of the cube only: write a region such as u0")
     if placed.fixes_nothing and not placed.form.has_reaction:
@@ -129,14 +132,14 @@ def newton(
             "newton: fluxes alone do not determine the solution: give a value, or an exchange, on a face or a region"
         )
     with one_blas_thread():
-        balance = _Balance.of(glued, placed, patches, options, linear_iterations)
+        balance = _Balance.of(whole, placed, patches, options, linear_iterations)
         full = 0.0 * balance.loads
         if start is not None:
             full = full.layout.joined(coefficients_in(start, patches))
         history: list[float] = []
         for step in range(1, load_steps + 1):
             full = balance.found(full, step / load_steps, history)
-        return _solution(glued, placed, patches, full, balance, history, load_steps)
+        return _solution(whole, placed, patches, full, balance, history, load_steps)
 
 
 @dataclass(frozen=True, eq=False)
@@ -211,22 +214,28 @@ class _Balance:
         if form.symmetric and not tangent.is_symmetric:
             raise ValueError(f"{type(form).__name__} has a derivative that is not symmetric: set `symmetric = False`")
         right = -self.unknowns.collect(rest + tangent.apply(missing))
-        free = self._solved(tangent, right, form.symmetric, float(np.clip(residual, *INNER)))
+        free = self._solved(full, tangent, right, float(np.clip(residual, *INNER)))
         return missing + rest.layout.joined(self.unknowns.spread(free))
 
-    def _solved(self, tangent: Tangent, right: Array, is_symmetric: bool, tolerance: float) -> Array:
+    def _solved(self, full: OnPatches, tangent: Tangent, right: Array, tolerance: float) -> Array:
         """Return the solution of a linear system, by GMRES where the matrix is not definite."""
-        operators = list(zip(*(tangent.block(i) for i in range(len(right))), strict=True))
-        inverses, joined = preconditioners(self.unknowns, operators, self.body.interfaces), self.loads.layout.joined
+        blocks, joined = [tangent.block(i) for i in range(len(right))], self.loads.layout.joined
+        survey = survey_of(self.loads.layout, len(right), blocks)
+        form = self.forces.forms[0]
 
         def product(x: Array) -> Array:
             return self.unknowns.collect(tangent.apply(joined(self.unknowns.spread(x))))
 
-        def precondition(residual: Array) -> Array:
-            return np.stack([inverse(part) for inverse, part in zip(inverses, residual, strict=True)])
+        def low_order(nodes: Glued) -> bsr_array:
+            forces = Forces(on_trilinear(nodes, self.forces.matrix), self.forces.forms)
+            linear = forces.derivative(NodalBasis.of(glued(self.unknowns)).values(full))
+            return entries_of(nodes, linear.apply, len(right), form.symmetric, self.forces.matrix)
 
-        system = product, right, precondition, tolerance, self.linear_iterations
-        if is_symmetric and (found := conjugate_gradients(*system)).breakdown != INDEFINITE:
+        inverse = preconditioner(
+            self.body, self.unknowns, survey, lambda: [own[0] for own in blocks], low_order, is_loose=False
+        )
+        system = product, right, inverse, tolerance, self.linear_iterations
+        if form.symmetric and (found := conjugate_gradients(*system)).breakdown != INDEFINITE:
             return np.asarray(found.x)
         return np.asarray(generalized_residuals(*system).x)
 

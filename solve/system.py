@@ -8,13 +8,13 @@ from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
 import numpy as np
+from scipy.sparse import bsr_array
 from scipy.sparse.linalg import LinearOperator
 
 from parameterize.arrays import Array, Mask, listed
 from parameterize.conjugate_gradients import LinearResult, conjugate_gradients
 from parameterize.spline.body import Body
 from parameterize.spline.bspline import greville
-from parameterize.spline.interface import Interface
 from parameterize.spline.volume import FACE_NAMES
 from parameterize.threads import one_blas_thread
 
@@ -34,9 +34,8 @@ from .discretization.unknowns import Glued, Unknowns, Window
 from .field import BodyField, FieldOnBody, SplineField
 from .forms.boundary_value_problem import BoundaryValueProblem
 from .forms.mass import Mass
-from .linear.glued import GluedPreconditioner
 from .linear.krylov import generalized_residuals
-from .linear.low_order import LowOrder, Survey, surveyed
+from .linear.low_order import LowOrder, Survey, surveyed, trilinear
 from .linear.preconditioner import Componentwise, fast_diagonalization
 from .options import IterationOptions, SolveOptions, check_device
 from .patch_system import PatchProblem, PatchSystem, operators_of, systems_of
@@ -440,24 +439,43 @@ def system_of(
         )
     right = unknowns.collect(loads - matrix.apply(known))
     right = balanced(right, unknowns) if is_open and not is_loose else right
-    inverse = preconditioner(body, unknowns, matrix, survey, is_loose)
+    inverse = preconditioner(
+        body,
+        unknowns,
+        survey,
+        lambda: operators_of(matrix, loads.components)[0],
+        lambda nodes: trilinear(nodes, matrix),
+        is_loose,
+    )
     return System(body, problem, patches, systems, matrix, unknowns, inverse, is_open, right)
 
 
 def preconditioner(
-    body: Body, unknowns: Unknowns, matrix: BodyMatrix, survey: Survey, is_loose: bool
+    body: Body,
+    unknowns: Unknowns,
+    survey: Survey,
+    operators: Callable[[], Sequence[Operator]],
+    low_order: Callable[[Glued], bsr_array],
+    is_loose: bool,
 ) -> Preconditioner:
     """Return the preconditioner of a matrix: fast diagonalization of one patch where it serves, otherwise low order.
 
-    It serves one component, and several where all faces are held: components and faces then couple little.
+    It serves one component, and several where all faces are held: components and faces then couple little. operators:
+    returns those of the components on the only patch. low_order: returns the matrix of trilinear functions on nodes.
     """
     if isinstance(unknowns, Window):
         space, components = unknowns.space, len(survey.diagonal[0])
         if components == 1 or len(space.dirichlet) == len(FACE_NAMES) or space.whole is not space:
-            return Componentwise(tuple(map(fast_diagonalization, operators_of(matrix, components)[0])))
-        unknowns = Glued.of([space], ())
+            return Componentwise(tuple(map(fast_diagonalization, operators())))
+    return LowOrder.of(body, glued(unknowns), low_order, survey, is_loose)
+
+
+def glued(unknowns: Unknowns) -> Glued:
+    """Return the unknowns of a body, those of a single patch numbered one after another."""
+    if isinstance(unknowns, Window):
+        return Glued.of([unknowns.space], ())
     assert isinstance(unknowns, Glued)
-    return LowOrder.of(body, unknowns, matrix, survey, is_loose)
+    return unknowns
 
 
 def _demand_held(
@@ -498,12 +516,3 @@ def demand_fixed(part: Sequence[int], free: Mask, processes: Processes) -> None:
     if all(processes.shared(bool(free.all()))):
         named = listed([f"p{number}" for number in part])
         raise ValueError(f"nothing fixes the solution on {named}, a part of its own: give it a value, or glue it")
-
-
-def preconditioners(
-    unknowns: Unknowns, operators: Sequence[Sequence[Operator]], interfaces: Sequence[Interface]
-) -> tuple[Any, ...]:
-    """Return the preconditioner of each component from the scalar operators of each patch."""
-    if not isinstance(unknowns, Glued):
-        return tuple(map(fast_diagonalization, operators[0]))
-    return tuple(GluedPreconditioner.of(unknowns, own, interfaces) for own in zip(*operators, strict=True))

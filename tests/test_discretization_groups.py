@@ -9,10 +9,8 @@ from solve.discretization.error_norms import Compared, error_norms
 from solve.discretization.group_kernels import multiply_patches
 from solve.discretization.groups import Layout
 from solve.discretization.lane_kernels import multiply_small
-from solve.discretization.operator import assemble, diagonals
+from solve.discretization.operator import assemble
 from solve.discretization.space import trial_space
-from solve.linear.preconditioner import fast_diagonalization
-from solve.linear.stacked import diagonalizations
 from solve.patch_system import operators_of
 
 
@@ -85,23 +83,6 @@ def matrix_diagonal(patch, problem):
     """Return the diagonal of the last component's block, assembled on the patch alone."""
     last = problem.form.components - 1
     return assemble(patch.volume, patch.space, problem.form, rule=patch.matrix.rule, component=last)[0].diagonal()
-
-
-def test_stacked_diagonalizations_are_those_of_single_patches():
-    free = dict.fromkeys(("v0", "v1", "w0", "w1", "u1"), "0")  # so that other patches alone hold patch 2
-    robin = {"p0_v1": ("2", "0"), "p3_v1": ("1", "0")}
-    problem = iga_nn.Poisson(source="1", kappa="1+x", robin=robin, neumann=free)
-    system = iga_nn.discretize(row_of((3, 3, 3, 3)), problem, refine=1)
-    operators = [patch.matrix for patch in system.patches]
-    ((numbers, stack),), alone = diagonalizations(operators, diagonals(operators))
-    assert not alone and numbers.tolist() == [0, 1, 2, 3]
-    residuals = np.random.default_rng(0).standard_normal((4, *operators[0].space.shape))
-    found = stack(residuals)
-    for operator, residual, result in zip(operators, residuals, found, strict=True):
-        window = operator.space.window
-        expected = np.zeros(result.shape)
-        expected[window] = fast_diagonalization(operator).held()(np.ascontiguousarray(residual[window]))
-        assert result == pytest.approx(expected, rel=1e-8, abs=1e-9 * np.abs(expected).max())
 
 
 @pytest.mark.parametrize("counts", [(3, 3, 3), (3, 4, 3)])

@@ -144,25 +144,6 @@ def diagonals(operators: Sequence[Operator]) -> list[Array]:
     return found
 
 
-def products(operators: Sequence[Operator], coefficients: Array) -> Array:
-    """Return the products (k, c, n_u n_v n_w) of operators and the same coefficients (c, n_u, n_v, n_w), without faces.
-
-    The spaces of all operators have one shape.
-    """
-    found = np.zeros((len(operators), len(coefficients), math.prod(coefficients.shape[1:])))
-    for numbers, stack, factors in _stacks(operators):
-        source, result = np.stack([coefficients] * len(numbers)), np.zeros((len(numbers), *coefficients.shape))
-        places = np.arange(len(numbers))
-
-        def multiply(piece: Piece) -> None:
-            where = places, *piece, stack.kinds, stack.tables, factors  # noqa: B023  # called in this turn of the loop
-            group_kernels.multiply_patches(source, *where, result)  # noqa: B023
-
-        stack.on_pieces(multiply)
-        found[numbers] = result.reshape(len(numbers), len(coefficients), -1)
-    return found
-
-
 def _stacks(operators: Sequence[Operator]) -> Iterator[tuple[list[int], Stack, Array]]:
     """Yield the numbers of the operators of one shape, their stack, and their factors (k, q_u, 6 or 7, q_w, q_v)."""
     shapes = defaultdict(list)

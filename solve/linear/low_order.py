@@ -7,7 +7,7 @@ where the map bends within a span and K is too stiff (docs/solver.md).
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from itertools import product
 from typing import Any, NamedTuple
@@ -20,7 +20,7 @@ from parameterize.spline.body import Body
 
 from ..discretization.grouped import BodyMatrix, assemble_body
 from ..discretization.groups import Layout, OnPatches
-from ..discretization.operator import diagonals
+from ..discretization.operator import Operator, diagonals
 from ..discretization.quadrature import GaussRule, gauss_rule
 from ..discretization.unknowns import Glued
 from .grids import Grid, on_nodes
@@ -53,12 +53,22 @@ class LowOrder:
     is_open: bool
 
     @classmethod
-    def of(cls, body: Body, unknowns: Glued, matrix: BodyMatrix, survey: Survey, is_loose: bool) -> "LowOrder":
-        """Return the preconditioner of a matrix on a body. is_loose: whether motions may be free."""
+    def of(
+        cls,
+        body: Body,
+        unknowns: Glued,
+        low_order: Callable[[Glued], bsr_array],
+        survey: Survey,
+        is_loose: bool,
+    ) -> "LowOrder":
+        """Return the preconditioner of a matrix on a body.
+
+        low_order: returns K for the nodes of this process. is_loose: whether motions may be free.
+        """
         is_open = all(unknowns.processes.shared(bool(survey.free.all())))
         with np.errstate(all="ignore"):  # it is looked at afterwards
             grid, diagonal = Grid.of(body, unknowns.of_body), unknowns.collect(survey.diagonal)
-            cycle = Multigrid.of(grid, unknowns, trilinear(on_nodes(unknowns.alone), matrix), is_open or is_loose)
+            cycle = Multigrid.of(grid, unknowns, low_order(on_nodes(unknowns.alone)), is_open or is_loose)
             local = np.divide(1.0, np.abs(diagonal), out=np.zeros_like(diagonal), where=diagonal != 0.0)
             found = cls(NodalBasis.of(unknowns), cycle, LOCAL * local, is_open)
             return found if found._is_usable() else cls(found.basis, None, local, is_open)
@@ -85,36 +95,51 @@ class LowOrder:
 
 
 def trilinear(nodes: Glued, matrix: BodyMatrix) -> bsr_array:
-    """Return the matrix of the law of another one for trilinear functions, in blocks of components.
+    """Return the matrix of the law of another one for trilinear functions, in blocks of components."""
+    form = matrix.laws[0].form
+    return entries_of(nodes, on_trilinear(nodes, matrix).apply, form.components, form.symmetric, matrix)
 
-    Terms on faces are lumped. A law that is not symmetric gives the symmetric part of the components' own blocks.
-    """
-    form, rules = matrix.laws[0].form, dict[Any, GaussRule]()
-    laws = []
+
+def on_trilinear(nodes: Glued, matrix: BodyMatrix) -> BodyMatrix:
+    """Return the operator of the law of another one on trilinear functions, without terms on faces."""
+    rules, laws = dict[Any, GaussRule](), []
     for law, space in zip(matrix.laws, nodes.spaces, strict=True):
         key = tuple(row.tobytes() for row in space.knots)
         if key not in rules:
             rules[key] = gauss_rule(space)
         laws.append(law._replace(space=space, rule=rules[key], source=None))
-    whole, _ = assemble_body(nodes.layout, laws, matrix.parts[0].threads)
-    is_scalar = laws[0].component is not None
-    blocks = [whole] if is_scalar or form.symmetric else [whole.block(i) for i in range(form.components)]
-    rows, columns, entries = _entries(nodes, blocks, form.components)
-    on_faces = nodes.layout.empty(form.components)
+    return assemble_body(nodes.layout, laws, matrix.parts[0].threads)[0]
+
+
+def entries_of(
+    nodes: Glued, apply: Callable[[OnPatches], OnPatches], components: int, is_symmetric: bool, matrix: BodyMatrix
+) -> bsr_array:
+    """Return the matrix that takes trilinear functions to their products, in blocks of components.
+
+    apply: returns the products. matrix: has the terms on faces, which are lumped. Of products that are not symmetric
+    the symmetric part of the components' own blocks is returned.
+    """
+    rows, columns, entries = _entries(nodes, apply, components)
+    on_faces = nodes.layout.empty(components)
     for part, own in zip(matrix.parts, on_faces, strict=True):
         for face in part.faces.values():
             for component, total in enumerate(own):
                 face.add_lumped(component, total, HELD)
     lumped = nodes.collect(on_faces)
     here = rows == columns
-    for component in range(form.components):
+    for component in range(components):
         entries[here, component, component] += lumped[component, rows[here]]
     starts = np.searchsorted(rows, np.arange(nodes.shape[0] + 1))
-    size = form.components * nodes.shape[0]
-    return bsr_array((entries, columns, starts), shape=(size, size))
+    shape = (components * nodes.shape[0],) * 2
+    if is_symmetric:
+        return bsr_array((entries, columns, starts), shape=shape)
+    blocks = bsr_array((entries * np.eye(components), columns, starts), shape=shape)
+    return bsr_array(0.5 * (blocks + blocks.T), blocksize=(components, components))
 
 
-def _entries(nodes: Glued, blocks: Sequence[BodyMatrix], components: int) -> tuple[IntArray, IntArray, Array]:
+def _entries(
+    nodes: Glued, apply: Callable[[OnPatches], OnPatches], components: int
+) -> tuple[IntArray, IntArray, Array]:
     """Return rows (k,), columns (k,) and entries (k, c, c) of a matrix of trilinear functions, sorted by rows.
 
     Nodes of which no third node sees two are multiplied in one product, so that there are 27 products a component.
@@ -127,27 +152,24 @@ def _entries(nodes: Glued, blocks: Sequence[BodyMatrix], components: int) -> tup
     keys, inverse = np.unique((places * count + columns)[is_free], return_inverse=True)
     entries = np.zeros((len(keys), components, components))
     for component in range(components):
-        whole = blocks[0] if len(blocks) == 1 else blocks[component]
-        found = np.stack([_product(nodes.layout, whole, colour, component, components) for colour in colours], axis=1)
+        units = (_unit(nodes.layout, components, component, colour) for colour in colours)
+        found = np.stack([_by_component(apply(unit)) for unit in units], axis=1)
         for row, values in enumerate(found):
             entries[:, row, component] = np.bincount(inverse, values[is_free], len(keys))
     return keys // count, keys % count, entries
 
 
-def _product(layout: Layout, matrix: BodyMatrix, colour: Sequence[int], component: int, components: int) -> Array:
-    """Return the products (c, all nodes of patches) with the nodes of a colour of one component."""
-    is_alone = isinstance(matrix.laws[0].component, int)
-    unit = layout.empty(1 if is_alone else components)
-    a, b, c = colour
+def _unit(layout: Layout, components: int, component: int, colour: Sequence[int]) -> OnPatches:
+    """Return one at the nodes of a colour in one component, zero elsewhere."""
+    unit, (a, b, c) = layout.empty(components), colour
     for part in unit.in_groups:
-        part[:, 0 if is_alone else component, a::3, b::3, c::3] = 1.0
-    parts = [np.moveaxis(part, 1, 0).reshape(part.shape[1], -1) for part in matrix.apply(unit).in_groups]
-    found = np.concatenate(parts, axis=1)
-    if len(found) == components:
-        return found
-    whole = np.zeros((components, found.shape[1]))
-    whole[component] = found[0]
-    return whole
+        part[:, component, a::3, b::3, c::3] = 1.0
+    return unit
+
+
+def _by_component(products: OnPatches) -> Array:
+    """Return products as (c, all nodes of patches)."""
+    return np.concatenate([np.moveaxis(part, 1, 0).reshape(part.shape[1], -1) for part in products.in_groups], axis=1)
 
 
 def _seen(layout: Layout, group: int) -> IntArray:
@@ -175,9 +197,14 @@ def _of_colour(n: int, colour: int) -> IntArray:
 def surveyed(matrix: BodyMatrix) -> Survey:
     """Return the survey of the matrix of a body; of several components one block after another is assembled."""
     first, components = matrix.laws[0], matrix.laws[0].form.components
-    diagonal, free = matrix.layout.empty(components), np.ones(len(matrix.parts), dtype=bool)
-    for component in range(components):
-        parts = (matrix.block(component) if first.component is None else matrix).parts
+    blocks = ((matrix.block(i) if first.component is None else matrix).parts for i in range(components))
+    return survey_of(matrix.layout, components, blocks)
+
+
+def survey_of(layout: Layout, components: int, blocks: Iterable[Sequence[Operator]]) -> Survey:
+    """Return the survey of operators: of each component those of all patches."""
+    diagonal, free = layout.empty(components), np.ones(len(layout.shapes), dtype=bool)
+    for component, parts in enumerate(blocks):
         for own, entries in zip(diagonal, diagonals(parts), strict=True):
             own[component] = entries
         free &= list(map(leaves_constants, parts))

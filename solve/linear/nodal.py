@@ -13,6 +13,7 @@ import numpy as np
 from parameterize.arrays import Array
 from parameterize.spline.bspline import collocation, greville
 
+from ..discretization.groups import OnPatches
 from ..discretization.space import TrialSpace
 from ..discretization.unknowns import Glued
 
@@ -23,10 +24,12 @@ Factors = tuple[Array, Array, Array]  # a direction each: (patches, n, n), or (1
 class NodalBasis:
     """Apply N^-1 and its transpose to vectors (c, m) of the free unknowns of a body.
 
-    inverses: of each group of patches. copies: (m,), the number of coefficients of patches that are one unknown.
+    matrices, inverses: N and N^-1 of each group of patches. copies: (m,), the number of coefficients of patches that
+    are one unknown.
     """
 
     unknowns: Glued
+    matrices: Sequence[Factors]
     inverses: Sequence[Factors]
     copies: Array
 
@@ -35,7 +38,15 @@ class NodalBasis:
         """Return the basis of the values at the Greville points."""
         groups = [[unknowns.spaces[patch] for patch in group] for group in unknowns.layout.groups]
         ones = unknowns.spread(np.ones((1, *unknowns.shape)))
-        return cls(unknowns, list(map(_inverses, groups)), unknowns.collect(ones)[0])
+        matrices = list(map(_values_of, groups))
+        return cls(unknowns, matrices, list(map(_inverses, matrices)), unknowns.collect(ones)[0])
+
+    def values(self, coefficients: OnPatches) -> OnPatches:
+        """Return N times all coefficients of the patches, fixed ones included."""
+        parts = replace(coefficients, flat=coefficients.flat.copy())
+        for (u, v, w), part in zip(self.matrices, parts.in_groups, strict=True):
+            part[:] = _applied(u, v, w, part)
+        return parts
 
     def coefficients(self, values: Array) -> Array:
         """Return N^-1 times values (c, m)."""
@@ -60,9 +71,14 @@ def _applied(u: Array, v: Array, w: Array, x: Array) -> Array:
     return (u[:, None] @ x.reshape(count, c, n_u, n_v * n_w)).reshape(count, c, n_u, n_v, n_w)
 
 
-def _inverses(spaces: Sequence[TrialSpace]) -> Factors:
-    """Return the inverses of a group of patches; those of equal knots are computed once."""
+def _values_of(spaces: Sequence[TrialSpace]) -> Factors:
+    """Return N of a group of patches; those of equal knots are one."""
     u, v, w = (_stacked([(space.knots[axis], space.degrees[axis]) for space in spaces]) for axis in range(3))
+    return u, v, w
+
+
+def _inverses(matrices: Factors) -> Factors:
+    u, v, w = (np.asarray(np.linalg.inv(own), dtype=np.float64) for own in matrices)
     return u, v, w
 
 
@@ -70,7 +86,7 @@ def _stacked(rows: Sequence[tuple[Array, int]]) -> Array:
     kinds: dict[bytes, int] = {}
     numbers = [kinds.setdefault(knots.tobytes(), len(kinds)) for knots, _ in rows]
     firsts = np.unique(numbers, return_index=True)[1]
-    different = np.stack([np.linalg.inv(_values(*rows[i])) for i in firsts])
+    different = np.stack([_values(*rows[i]) for i in firsts])
     return different if len(different) == 1 else different[numbers]
 
 

@@ -65,18 +65,6 @@ class FastDiagonalization:
             result -= self._mean(result)
         return result.reshape(shape)
 
-    def held(self) -> FastDiagonalization:
-        """Return the preconditioner of a patch that other patches hold: constants count as the slowest other mode.
-
-        On the frame of 20 patches with one face held that takes 54 iterations, without the constants 80.
-        """
-        if not self.singular:
-            return self
-        inverse = self.inverse.copy()
-        inverse[0, 0, 0] = 0.0
-        inverse[0, 0, 0] = inverse.max()
-        return replace(self, inverse=inverse, singular=False)
-
     def _mean(self, x: Array) -> Any:
         """Return the mean over the free coefficients of all processes."""
         return self.space.total(x.sum()) / len(self.vectors[0]) / math.prod(x.shape[1:])
