@@ -42,6 +42,10 @@ EXTREME_REMEDY = ": the numbers of the law or of the map lie too far apart; scal
 SLENDER = {1: 1.0, 2: 8.0}
 SLENDER_CUBIC = 30.0
 TWO_PROBLEMS = "the errors compare the solutions of two problems"
+TOO_STIFF = (
+    "near Poisson's ratio 1/2 the displacement alone is too stiff, by any factor: do not trust it; formulation 'mixed' "
+    "is taken by one process, with degree 2 or more and a ratio above 0 everywhere"
+)
 
 
 class ConvergenceError(RuntimeError):
@@ -275,7 +279,7 @@ def failure(patches: Sequence[PatchProblem], result: LinearResult, caveat: str =
         f"iterations (lowest {min(residuals):.1e}); "
     )
     if caveat:
-        return f"{said}{caveat}, which takes many iterations: allow more of them, or try 0.45"
+        return f"{said}{caveat}, which takes many iterations of the displacement alone: take formulation='mixed'"
     worst = [(*worst_place(patch.volume, patch.space), patch.problem.prefix) for patch in patches]
     parameters, point, scaled, prefix = min(worst, key=lambda place: place[2])
     cube, where = (

@@ -15,7 +15,7 @@ from parameterize.files import save_arrays
 from parameterize.spline.body import BodyLike
 from parameterize.threads import one_blas_thread
 
-from .diagnostics import ConvergenceError, bending_notices
+from .diagnostics import TOO_STIFF, ConvergenceError, bending_notices
 from .field import BodyField
 from .forms.boundary_value_problem import BoundaryValueProblem
 from .linear.direct import factorized, price_of, sparse
@@ -165,7 +165,8 @@ def modes(
     pencil = Pencil(by_columns(system.operator.matvec), mass, _inverse(system), of_unit_mass(motions, mass))
     with one_blas_thread():
         found = pencil.lowest(n, tolerance, max_iterations)
-    notices = (*_notices(found), *bending_notices(system.patches))
+    stiff = [TOO_STIFF] if law.form.caveat else []
+    notices = (*_notices(found), *bending_notices(system.patches), *stiff)
     if found.worst > tolerance:
         remedy = "raise max_iterations or the tolerance, or ask for some more modes where several lie close together"
         raise ConvergenceError(

@@ -19,7 +19,7 @@ from parameterize.spline.volume import FACE_NAMES
 from parameterize.threads import one_blas_thread
 
 from .assembly import Assembled, assemble_body_data, balanced
-from .diagnostics import ConvergenceError, failure, folded_notices, judge, map_notices
+from .diagnostics import TOO_STIFF, ConvergenceError, failure, folded_notices, judge, map_notices
 from .discretization.error_norms import Compared, Errors, error_norms, missing_mean
 from .discretization.estimate import error_estimate, estimated_squares, why_not_estimated
 from .discretization.grouped import BodyMatrix, Law, assemble_body
@@ -242,6 +242,8 @@ class System:
             doubtful.append(f"the error is not estimated: {problem.form.caveat}; compare two refinements")
         elif errors is None and len(self.stated) > 1 and (why := self._unknown):
             doubtful.append(f"the error is not estimated: {why}; compare two refinements")
+        if problem.form.caveat and self.formulation == "displacement":
+            doubtful.append(TOO_STIFF)
         if not has_norm:
             doubtful.append(f"the solution reaches {largest:.1e}, too large for its norms: choose other units")
         weaknesses = processes.shared(self.inverse.weakness)

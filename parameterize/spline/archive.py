@@ -6,6 +6,7 @@ g0_knots_u, .. once for all of them, and all other arrays with one row a patch, 
 Rational patches also have weights. A row of `interfaces` has seven whole numbers, see interface_rows.py.
 """
 
+import re
 from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
@@ -81,8 +82,11 @@ def load_patch_arrays(path: str | Path, names: Sequence[str], extra: Sequence[st
     Raises FileNotFoundError, or ValueError that names the defect of the file.
     """
     held = array_names(path)
-    kind, own = ("g", ("patches", *BASIS, *names)) if "g0_degrees" in held else ("p", (*BASIS, *names))
-    before = [f"{kind}{number}_" for number in range(sum(name.endswith("_degrees") for name in held))]
+    kind, own = (
+        ("g", ("patches", *BASIS, *names)) if any(name.startswith("g0_") for name in held) else ("p", (*BASIS, *names))
+    )
+    numbers = [int(found[1]) for name in held if (found := re.match(rf"{kind}(\d+)_", name))]
+    before = [f"{kind}{number}_" for number in range(max(numbers, default=-1) + 1)]
     wanted, further = (tuple(start + name for start in before for name in some) for some in (own, extra))
     data = load_arrays(path, wanted, further)
     rows: list[PatchArrays] = [
