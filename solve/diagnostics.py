@@ -263,10 +263,12 @@ def _slenderness(patch: PatchProblem) -> tuple[float, float, int]:
     return max((ratio / SLENDER.get(degree, SLENDER_CUBIC), ratio, degree) for ratio, degree in found)
 
 
-def failure(patches: Sequence[PatchProblem], result: LinearResult, caveat: str = "") -> str:
+def failure(
+    patches: Sequence[PatchProblem], result: LinearResult, caveat: str = "", formulation: str = "displacement"
+) -> str:
     """Return in one line why the linear solver did not converge and where the map is worst; "" where it converged.
 
-    caveat: the caveat of the law.
+    caveat: the caveat of the law. formulation: that of the unknowns.
     """
     if result.converged:
         return ""
@@ -279,7 +281,8 @@ def failure(patches: Sequence[PatchProblem], result: LinearResult, caveat: str =
         f"iterations (lowest {min(residuals):.1e}); "
     )
     if caveat:
-        return f"{said}{caveat}, which takes many iterations of the displacement alone: take formulation='mixed'"
+        remedy = "allow more of them" if formulation == "mixed" else "take formulation='mixed'"
+        return f"{said}{caveat}, which takes many iterations: {remedy}"
     worst = [(*worst_place(patch.volume, patch.space), patch.problem.prefix) for patch in patches]
     parameters, point, scaled, prefix = min(worst, key=lambda place: place[2])
     cube, where = (

@@ -223,7 +223,7 @@ class System:
         dofs = problem.form.components * self.unknowns.count
         clock, sent = [time.process_time()], processes.traffic()
         result = self._iterate(options)
-        failed = failure(self.stated, result, "" if self.formulation == "mixed" else problem.form.caveat)
+        failed = failure(self.stated, result, problem.form.caveat, self.formulation)
         if failed and result.iterations == 0:  # there is the start alone
             raise ConvergenceError(failed)
         steps = result.iterations + (options.start is not None)  # products made

@@ -225,7 +225,7 @@ def test_a_traction_needs_no_body_force_and_0_is_a_free_face(in_folder):
 
 def test_a_solver_that_cannot_begin_writes_no_solution(in_folder, monkeypatch, capsys):
     benchmark_volume(2).save("map.npz")
-    monkeypatch.setattr("solve.linear.preconditioner.FastDiagonalization.__call__", lambda _, r: r * np.nan)
+    monkeypatch.setattr("solve.linear.low_order.LowOrder.__call__", lambda _, r: r * np.nan)
     assert main(["solve", "elasticity", "map.npz", "--traction", "u1=0;0;-2", "--refine", "0", "--quiet"]) == 4
     assert "does not give finite numbers" in capsys.readouterr().err
     assert not Path("map/solution.npz").exists()

@@ -22,7 +22,7 @@ from parameterize.arrays import Array, IntArray, Knots, Mask
 from parameterize.spline.body import BodyLike, as_body
 from parameterize.spline.bspline import breakpoints
 from parameterize.spline.volume import AXES, FACE_NAMES
-from solve.field import FieldOnBody
+from solve.field import BodyField, FieldOnBody
 from solve.forms.boundary_value_problem import BoundaryValueProblem
 from solve.forms.form import Quantity
 
@@ -106,6 +106,8 @@ def scene_of(
     """
     if solution is None or not all(np.all(np.isfinite(field.coefficients)) for field in solution.patches):
         return _scene(body, [Frame("", [])], coarser)
+    if isinstance(solution, BodyField) and solution.body is None:  # as a file holds it
+        solution = replace(solution, body=as_body(body))
     frame = Frame.of("", solution)
     if problem is not None and problem.exact is not None:
         frame = replace(frame, fields=[*frame.fields, error_of(body, solution, problem)])

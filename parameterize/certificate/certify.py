@@ -15,6 +15,7 @@ from ..arrays import IntArray, in_brackets
 from ..display import Shown
 from ..spline.body import Body, BodyLike, as_body
 from ..spline.interface import Interface
+from ..spline.patch_groups import groups_of
 from .gluing import on_one_side
 from .jacobian import Parameters, PatchCertificate, Verdict, certify_patches
 
@@ -172,7 +173,7 @@ def certify(body: BodyLike, *, max_depth: int = 6) -> Certificate:
     if max_depth < 0:
         raise ValueError(f"max_depth must be non-negative, got {max_depth}")
     patches: list[Any] = [None] * len(glued)
-    for group in glued.groups:
+    for group in groups_of(glued.patches):  # afresh: arrays of a patch may have changed since the body was made
         for number, certificate in zip(group.numbers, certify_patches(glued.patches, group, max_depth), strict=True):
             patches[number] = certificate
     return Certificate(tuple(patches), tuple(_misglued(glued, patches)))
