@@ -12,7 +12,7 @@ from parameterize.spline.volume import FACE_NAMES, BSplineVolume
 
 from .discretization.face_data import FaceRule, coefficients_of_patches, face_rule, has_face
 from .discretization.grouped import BodyMatrix, Law, assemble_body
-from .discretization.groups import Layout, OnPatches
+from .discretization.groups import CoefficientLayout, OnPatches
 from .discretization.on_regions import renewed, weak_faces
 from .discretization.operator import FormOperator, Operator
 from .discretization.roughness import Measured, rules_of
@@ -94,7 +94,7 @@ def assemble_body_data(patches: Sequence[Stated], options: SolveOptions) -> Asse
         form, source = patch.problem.form, patch.problem.source_at
         component = 0 if form.components == 1 and form.symmetric and not couples else None
         laws.append(Law(patch.volume, patch.space, rule, form, source, component, law))
-    layout = Layout.of([patch.space for patch in patches])
+    layout = CoefficientLayout.of([patch.space for patch in patches])
     matrix, loads = assemble_body(layout, laws, options.thread_count)
     terms: list[dict[str, Any]] = []
     for patch, load in zip(patches, loads, strict=True):
@@ -104,7 +104,7 @@ def assemble_body_data(patches: Sequence[Stated], options: SolveOptions) -> Asse
     return Assembled(matrix.with_faces(terms), loads, _known(patches, layout))
 
 
-def _known(patches: Sequence[Stated], layout: Layout) -> OnPatches:
+def _known(patches: Sequence[Stated], layout: CoefficientLayout) -> OnPatches:
     """Return the fixed coefficients of each patch; those of patches with equal knots and data are found at once."""
     known, groups = layout.empty(patches[0].problem.form.components), defaultdict(list)
     for number, patch in enumerate(patches):

@@ -37,7 +37,7 @@ from .options import SolveOptions
 from .patch_system import PatchProblem, operators_of
 from .solution import Solution, SolveReport
 from .solver import prepared
-from .system import coefficients_in, demand_fixed, field_of, glued, preconditioner
+from .system import coefficients_in, demand_fixed, field_of, glued, is_diagonalized, preconditioner
 
 ENOUGH = 0.8  # share of the forces along a step that may be left at its end
 SHORTEST = 2.0**-12  # of a step
@@ -231,9 +231,8 @@ class _Balance:
             linear = forces.derivative(NodalBasis.of(glued(self.unknowns)).values(full))
             return entries_of(nodes, linear.apply, len(right), form.symmetric, self.forces.matrix)
 
-        inverse = preconditioner(
-            self.body, self.unknowns, survey, lambda: [own[0] for own in blocks], low_order, is_loose=False
-        )
+        operators = [own[0] for own in blocks] if is_diagonalized(self.unknowns, len(right)) else ()
+        inverse = preconditioner(self.body, self.unknowns, survey, operators, low_order, is_loose=False)
         system = product, right, inverse, tolerance, self.linear_iterations
         if form.symmetric and (found := conjugate_gradients(*system)).breakdown != INDEFINITE:
             return np.asarray(found.x)

@@ -1,8 +1,6 @@
 """Solves any problem: checks it, discretizes it, and solves the linear system."""
 
 import functools
-from collections import defaultdict
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -181,13 +179,9 @@ def _on_patches(
     if not isinstance(problem, BoundaryValueProblem):
         raise TypeError(f"problem must be a Poisson, an Elasticity or a Problem, got {type(problem).__name__}")
     _demand_known_patches(body, problem)
-    placed, patches, rings = problem.on(body), [], defaultdict(list)
-    for interface in body.interfaces:
-        if interface.ring is not None:
-            rings[interface.first[0]].append(interface.ring)
+    placed, patches = problem.on(body), []
     for i, (volume, own) in enumerate(zip(body, placed.on_patches(body), strict=True)):
         space = trial_space(volume, options.refine, options.degree, own.dirichlet, body.outer[i])
-        space = replace(space, periodic=tuple(rings[i]))
         patches.append(PatchProblem(volume, own, shared_space(space, options.comm) if body.is_single else space))
     return placed, patches
 

@@ -35,7 +35,7 @@ from .field import BodyField, FieldOnBody, SplineField
 from .forms.boundary_value_problem import BoundaryValueProblem
 from .forms.mass import Mass
 from .linear.krylov import generalized_residuals
-from .linear.low_order import LowOrder, Survey, surveyed, trilinear
+from .linear.low_order import LowOrder, Survey, survey_of, surveyed, trilinear
 from .linear.preconditioner import Componentwise, fast_diagonalization
 from .options import IterationOptions, SolveOptions, check_device
 from .patch_system import PatchProblem, PatchSystem, operators_of, systems_of
@@ -431,7 +431,9 @@ def system_of(
     matrix, loads = found.matrix, found.loads
     known = matrix.layout.joined(unknowns.completed(found.known))
     systems = systems_of([patches[number] for number in unknowns.patches], found._replace(known=known))
-    survey = surveyed(matrix)
+    components = loads.components
+    operators = operators_of(matrix, components)[0] if is_diagonalized(unknowns, components) else ()
+    survey = survey_of(matrix.layout, components, [[own] for own in operators]) if operators else surveyed(matrix)
     _demand_held(body, problem, systems, unknowns, survey.free, is_loose)
     is_open = all(unknowns.processes.shared(bool(survey.free.all())))
     if is_open and not is_loose and isinstance(systems[0].matrix, FormOperator):
@@ -445,30 +447,39 @@ def system_of(
         body,
         unknowns,
         survey,
-        lambda: operators_of(matrix, loads.components)[0],
+        operators,
         lambda nodes: trilinear(nodes, matrix),
         is_loose,
     )
     return System(body, problem, patches, systems, matrix, unknowns, inverse, is_open, right)
 
 
+def is_diagonalized(unknowns: Unknowns, components: int) -> bool:
+    """Return whether fast diagonalization serves: one patch with one component, or with all faces held.
+
+    Components and faces of such patches couple little. Slabs of processes have no other preconditioner.
+    """
+    if not isinstance(unknowns, Window):
+        return False
+    space = unknowns.space
+    return components == 1 or len(space.dirichlet) == len(FACE_NAMES) or space.whole is not space
+
+
 def preconditioner(
     body: Body,
     unknowns: Unknowns,
     survey: Survey,
-    operators: Callable[[], Sequence[Operator]],
+    operators: Sequence[Operator],
     low_order: Callable[[Glued], bsr_array],
     is_loose: bool,
 ) -> Preconditioner:
-    """Return the preconditioner of a matrix: fast diagonalization of one patch where it serves, otherwise low order.
+    """Return the preconditioner of a matrix: fast diagonalization where it serves, otherwise low order.
 
-    It serves one component, and several where all faces are held: components and faces then couple little. operators:
-    returns those of the components on the only patch. low_order: returns the matrix of trilinear functions on nodes.
+    operators: those of the components on the only patch where they are diagonalized, none otherwise. low_order:
+    returns the matrix of trilinear functions on nodes.
     """
-    if isinstance(unknowns, Window):
-        space, components = unknowns.space, len(survey.diagonal[0])
-        if components == 1 or len(space.dirichlet) == len(FACE_NAMES) or space.whole is not space:
-            return Componentwise(tuple(map(fast_diagonalization, operators())))
+    if operators:
+        return Componentwise(tuple(map(fast_diagonalization, operators, survey.diagonal[0])))
     return LowOrder.of(body, glued(unknowns), low_order, survey, is_loose)
 
 

@@ -7,7 +7,7 @@ from cube_grids import row_of
 import iga_nn
 from solve.discretization.error_norms import Compared, error_norms
 from solve.discretization.group_kernels import multiply_patches
-from solve.discretization.groups import Layout
+from solve.discretization.groups import CoefficientLayout
 from solve.discretization.lane_kernels import multiply_small
 from solve.discretization.operator import assemble
 from solve.discretization.space import trial_space
@@ -16,7 +16,7 @@ from solve.patch_system import operators_of
 
 def test_patches_of_one_shape_stand_side_by_side():
     spaces = [trial_space(volume) for volume in row_of((3, 4, 3, 3)).patches]
-    layout = Layout.of(spaces)
+    layout = CoefficientLayout.of(spaces)
     assert layout.groups == ((0, 2, 3), (1,))
     parts = [np.random.default_rng(i).standard_normal((2, *space.shape)) for i, space in enumerate(spaces)]
     joined = layout.joined(parts)

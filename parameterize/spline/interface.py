@@ -58,13 +58,6 @@ class Interface:
         return f"{face_label(*self.first)} = {face_label(*self.second)}"
 
     @property
-    def ring(self) -> int | None:
-        """Return the direction along which a patch is glued to itself without a turn, None for other interfaces."""
-        (p, face_p), (q, face_q) = self.first, self.second
-        is_ring = p == q and face_p[0] == face_q[0] and not self.swapped and not any(self.flipped)
-        return axis_side(face_p)[0] if is_ring else None
-
-    @property
     def directions(self) -> tuple[tuple[int, int, bool], ...]:
         """Return each direction of the first face, that of the second one along it, and whether they are opposite."""
         second = varying(self.second[1])

@@ -14,16 +14,16 @@ from .grouped import BodyMatrix
 from .groups import OnPatches
 from .kernels import Tables, compiled, evaluate_plane, spread_plane
 from .operator import ONE
-from .stack import Piece, Stack
+from .stack import PatchStack, Piece
 from .weak import WeakFace
 
 Weights = tuple[Array, Array, Array]  # of the points of the three directions, (kinds, q) each
 
 
-class _Rows(NamedTuple):
+class _PressedStack(NamedTuple):
     """Hold a stack of patches of a group: their places in it, and the rows R (k, q_u, 3, 3, q_w, q_v) at the points."""
 
-    stack: Stack
+    stack: PatchStack
     group: int
     places: IntArray
     numbers: IntArray
@@ -48,7 +48,7 @@ class Divergence:
         groups = list(zip(u.in_groups, result.in_groups, strict=True))
         for own in self._stacks:
 
-            def add(piece: Piece, own: _Rows = own) -> None:
+            def add(piece: Piece, own: _PressedStack = own) -> None:
                 source, total = groups[own.group]
                 where = own.places, *piece, own.stack.kinds, own.stack.tables
                 divergences(source, *where, own.rows, own.weights, total)
@@ -65,7 +65,7 @@ class Divergence:
         for own in self._stacks:
             compliance = self.compliance[own.numbers]
 
-            def add(piece: Piece, own: _Rows = own, compliance: Array = compliance) -> None:
+            def add(piece: Piece, own: _PressedStack = own, compliance: Array = compliance) -> None:
                 source, total = groups[own.group]
                 where = own.places, *piece, own.stack.kinds, own.stack.tables
                 spread_pressures(source, *where, own.rows, own.weights, compliance, total)
@@ -86,20 +86,20 @@ class Divergence:
         ]
 
     @cached_property
-    def _stacks(self) -> list[_Rows]:
+    def _stacks(self) -> list[_PressedStack]:
         return list(self._found())
 
-    def _found(self) -> Iterator[_Rows]:
+    def _found(self) -> Iterator[_PressedStack]:
         groups = self.matrix.layout.groups
         for own in self.matrix.stacks:
             assert own.factors is not None
             numbers = np.array(groups[own.group])[own.places]
-            yield _Rows(own.stack, own.group, own.places, numbers, own.factors, _weights(own.stack))
+            yield _PressedStack(own.stack, own.group, own.places, numbers, own.factors, _weights(own.stack))
         for patch in self.matrix.alone:
             part = self.matrix.parts[patch]
             group = next(i for i, members in enumerate(groups) if patch in members)
             place = np.array([groups[group].index(patch)])
-            yield _Rows(part.stack, group, place, ONE + patch, part.rows[None], _weights(part.stack))
+            yield _PressedStack(part.stack, group, place, ONE + patch, part.rows[None], _weights(part.stack))
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,7 +127,7 @@ class HeldFace:
         target += (self.face.tables[0].T @ values.T).T.reshape(target.shape)
 
 
-def _weights(stack: Stack) -> Weights:
+def _weights(stack: PatchStack) -> Weights:
     firsts: Sequence[int] = np.unique(stack.kinds, return_index=True)[1].tolist()
     u, v, w = (np.stack([stack.rules[i].weights[axis] for i in firsts]) for axis in range(3))
     return u, v, w

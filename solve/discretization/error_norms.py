@@ -16,7 +16,7 @@ from .error_kernels import error_squares
 from .processes import Processes
 from .quadrature import GaussRule, gauss_rule, map_rows
 from .space import TrialSpace
-from .stack import Piece, Stack, Stacked, stacks_of
+from .stack import PatchStack, Piece, Stacked, stacks_of
 
 PLANES = 16  # of points of u, in a piece of work
 POINTS = 2**15  # of a plane that are evaluated at once: their arrays fit into a processor's cache
@@ -83,7 +83,7 @@ def _stacked(part: Compared, rules: dict[Any, GaussRule], counts: Sequence[int] 
     return Stacked(part.volume, space, rules[key], part.exact if part.same is None else part.same)
 
 
-def _squares_of_stack(stack: Stack, parts: Sequence[Compared]) -> tuple[Array, bool]:
+def _squares_of_stack(stack: PatchStack, parts: Sequence[Compared]) -> tuple[Array, bool]:
     """Return the sums of `_squares` over several patches of one shape."""
     coefficients = np.stack([part.coefficients for part in parts])
     sums, has_gradient = np.zeros((len(parts), stack.shape[0], 4)), []

@@ -17,11 +17,11 @@ from parameterize.spline.volume import BSplineVolume
 
 from ..forms.form import Form
 from . import group_kernels, lane_kernels
-from .groups import Layout, OnPatches
+from .groups import CoefficientLayout, OnPatches
 from .operator import Source, assemble_stack, multiply_law
 from .quadrature import GaussRule
 from .space import TrialSpace
-from .stack import Piece, Stack, Stacked, stacks_of
+from .stack import PatchStack, Piece, Stacked, stacks_of
 
 
 class Law(NamedTuple):
@@ -50,7 +50,7 @@ class StackMatrix:
     flux.
     """
 
-    stack: Stack
+    stack: PatchStack
     group: int
     places: IntArray
     forms: Sequence[Form]
@@ -84,7 +84,7 @@ class BodyMatrix:
     alone: the numbers of the patches that are in no stack, because no other patch has their shape.
     """
 
-    layout: Layout
+    layout: CoefficientLayout
     laws: Sequence[Law]
     parts: Sequence[Any]  # MatrixFree
     stacks: Sequence[StackMatrix]
@@ -130,7 +130,7 @@ class BodyMatrix:
         return coo_array((values, (rows, columns)), shape=(components * starts[-1],) * 2).tocsr()
 
     @property
-    def every_stack(self) -> list[tuple[Stack, int, IntArray]]:
+    def every_stack(self) -> list[tuple[PatchStack, int, IntArray]]:
         """Return the stacks of all patches, with the number of the group and the places in it, one patch alone too."""
         threads = self.parts[0].threads
         groups = [[_stacked(self.laws[patch]) for patch in group] for group in self.layout.groups]
@@ -152,7 +152,7 @@ class BodyMatrix:
         return replace(found, parts=[replace(block, faces=own.faces, component=component) for block, own in both])
 
 
-def assemble_body(layout: Layout, laws: Sequence[Law], threads: int) -> tuple[BodyMatrix, OnPatches]:
+def assemble_body(layout: CoefficientLayout, laws: Sequence[Law], threads: int) -> tuple[BodyMatrix, OnPatches]:
     """Return the matrix and the loads (c, n_u, n_v, n_w) of the laws on all patches, without terms on faces."""
     parts: list[Any] = [None] * len(laws)
     loads, stacks, alone = layout.empty(laws[0].form.components), [], []

@@ -3,8 +3,8 @@
 Patches of equal degrees and equal numbers of functions are a group: their coefficients are an array (patches, c, n_u,
 n_v, n_w). The arrays of all groups are parts of one array without dimensions, in which a patch has (c, n_u, n_v, n_w),
 so that spreading a vector to the patches and collecting integrals are one pass over numbers. Matrices of a group have a
-leading dimension of patches, too (`grouped.Stack`), and compiled kernels run over it. A body of one patch is a group of
-one.
+leading dimension of patches, too (`stack.PatchStack`), and compiled kernels run over it. A body of one patch is a group
+of one.
 """
 
 import math
@@ -22,7 +22,7 @@ from .space import TrialSpace
 
 
 @dataclass(frozen=True)
-class Layout:
+class CoefficientLayout:
     """Say where the coefficients of each patch stand among those of a body.
 
     shapes: (n_u, n_v, n_w) of each patch. groups: the numbers of the patches of each group, in ascending order.
@@ -32,7 +32,7 @@ class Layout:
     groups: tuple[tuple[int, ...], ...]
 
     @classmethod
-    def of(cls, spaces: Sequence[TrialSpace]) -> "Layout":
+    def of(cls, spaces: Sequence[TrialSpace]) -> "CoefficientLayout":
         """Return the layout of patches with the given spaces."""
         found: dict[Any, list[int]] = {}
         for number, space in enumerate(spaces):
@@ -77,7 +77,7 @@ class OnPatches(Sequence[Array]):
     They add up, and are multiplied by numbers, as vectors do.
     """
 
-    layout: Layout
+    layout: CoefficientLayout
     components: int
     flat: Array
     __array_ufunc__ = None  # a number of NumPy times this is __rmul__, too

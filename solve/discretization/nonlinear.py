@@ -16,7 +16,7 @@ from . import group_kernels
 from .grouped import BodyMatrix
 from .groups import OnPatches
 from .operator import Operator
-from .stack import Piece, Stack, of_law, of_patches
+from .stack import PatchStack, Piece, of_law, of_patches
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,7 +27,7 @@ class StackForces:
     patch.
     """
 
-    stack: Stack
+    stack: PatchStack
     group: int
     places: IntArray
     forms: Sequence[Form]
@@ -71,8 +71,8 @@ class StackForces:
     def _planes(self, piece: Piece, source: Array) -> Iterator[tuple[int, Array, Array, Array, Array, Points]]:
         """Yield for every point q of u: q, rows R, w |det J|, fields, gradients, and the points in space.
 
-        R and w |det J| are those of `Stack.geometry`. Fields (m, c, 4, q_w, q_v) are u and its parametric derivatives,
-        gradients are (m, c, 3, q_w, q_v).
+        R and w |det J| are those of `PatchStack.geometry`. Fields (m, c, 4, q_w, q_v) are u and its parametric
+        derivatives, gradients are (m, c, 3, q_w, q_v).
         """
         patches, _ = piece
         which, kinds = self.places[patches], self.stack.kinds[patches]

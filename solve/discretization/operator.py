@@ -23,7 +23,7 @@ from ..forms.form import Form, reaction
 from . import group_kernels, kernels
 from .quadrature import GaussRule, operator_rule
 from .space import TrialSpace
-from .stack import Piece, Stack, colours, of_law, of_patches
+from .stack import PatchStack, Piece, colours, of_law, of_patches
 from .unknowns import Window
 
 Source = Callable[[Array], Array]
@@ -72,9 +72,9 @@ class MatrixFree:
         return self.rule.tabulate(self.space.degrees, self.space.knots)
 
     @property
-    def stack(self) -> Stack:
+    def stack(self) -> PatchStack:
         """Return the patch as a stack of one."""
-        return Stack((self.space,), (self.rule,), self.threads)
+        return PatchStack((self.space,), (self.rule,), self.threads)
 
     def on_planes(self, task: Callable[[IntArray], None]) -> None:
         """Run a task on all points of u, in pieces.
@@ -144,14 +144,14 @@ def diagonals(operators: Sequence[Operator]) -> list[Array]:
     return found
 
 
-def _stacks(operators: Sequence[Operator]) -> Iterator[tuple[list[int], Stack, Array]]:
+def _stacks(operators: Sequence[Operator]) -> Iterator[tuple[list[int], PatchStack, Array]]:
     """Yield the numbers of the operators of one shape, their stack, and their factors (k, q_u, 6 or 7, q_w, q_v)."""
     shapes = defaultdict(list)
     for number, operator in enumerate(operators):
         shapes[operator.space.degrees, operator.space.shape, operator.factors.shape].append(number)
     for numbers in shapes.values():
         own = [operators[number] for number in numbers]
-        stack = Stack([one.space for one in own], [one.rule for one in own], own[0].threads, runs=(0, len(own)))
+        stack = PatchStack([one.space for one in own], [one.rule for one in own], own[0].threads, runs=(0, len(own)))
         yield numbers, stack, own[0].factors[None] if len(own) == 1 else np.stack([one.factors for one in own])
 
 
@@ -159,8 +159,8 @@ def _stacks(operators: Sequence[Operator]) -> Iterator[tuple[list[int], Stack, A
 class FormOperator(MatrixFree):
     """Apply the matrix of any law's form.
 
-    rows: (q_u, 3, 3, q_w, q_v), R of `Stack.geometry`, stored for a constant law; for other laws R is computed from
-    the map in every product.
+    rows: (q_u, 3, 3, q_w, q_v), R of `PatchStack.geometry`, stored for a constant law; for other laws R is computed
+    from the map in every product.
     """
 
     volume: BSplineVolume
@@ -168,9 +168,9 @@ class FormOperator(MatrixFree):
     rows: Array | None
 
     @cached_property
-    def stack(self) -> Stack:
+    def stack(self) -> PatchStack:
         """Return the patch as a stack of one, with its map."""
-        return Stack((self.space,), (self.rule,), self.threads, (self.volume,), (0, 1))
+        return PatchStack((self.space,), (self.rule,), self.threads, (self.volume,), (0, 1))
 
     def _multiply(self, points: IntArray, coefficients: Array, result: Array) -> None:
         rows = None if self.rows is None else self.rows[None]
@@ -206,13 +206,13 @@ def assemble(
     space. Raises a ValueError that names a point where det J is zero.
     """
     rule = rule or operator_rule(space, "spline")
-    stack = Stack((space,), (rule,), threads, (volume,), (0, 1))
+    stack = PatchStack((space,), (rule,), threads, (volume,), (0, 1))
     found, _, loads = assemble_stack(stack, [form], [source], component)
     return found[0], loads[0]
 
 
 def assemble_stack(
-    stack: Stack, forms: Sequence[Form], sources: Sequence[Source | None], component: int | None
+    stack: PatchStack, forms: Sequence[Form], sources: Sequence[Source | None], component: int | None
 ) -> tuple[list[Any], Array | None, Array]:
     """Return the operators and the loads (k, c, n_u, n_v, n_w) of the laws of a stack's patches, as `assemble` does.
 
@@ -262,7 +262,7 @@ def assemble_stack(
 
 
 def multiply_law(
-    stack: Stack,
+    stack: PatchStack,
     piece: Piece,
     places: IntArray,
     form: Form,
@@ -296,7 +296,7 @@ def multiply_law(
         group_kernels.spread_splines(fields, which, kinds, q, stack.tables, form.has_reaction, result)
 
 
-def _demand_invertible(stack: Stack, patches: IntArray, q: int, measure: Array) -> None:
+def _demand_invertible(stack: PatchStack, patches: IntArray, q: int, measure: Array) -> None:
     """Raise ValueError where det J is zero on the planes of point `q`, from measure (m, q_w, q_v) = w det J."""
     if measure.all():
         return
@@ -305,7 +305,7 @@ def _demand_invertible(stack: Stack, patches: IntArray, q: int, measure: Array) 
     raise ValueError(f"volume: det J is zero at the parameters {where}; such a map has no inverse there")
 
 
-def _folded(stack: Stack, negative: IntArray, volumes: Array) -> list[int]:
+def _folded(stack: PatchStack, negative: IntArray, volumes: Array) -> list[int]:
     """Return the number of points of each patch where det J has the other sign than its integral.
 
     negative: (k,), the number of points with det J < 0. volumes: (k,), the integrals of det J over a process's points.

@@ -15,7 +15,7 @@ import numpy as np
 from parameterize.arrays import Array, IntArray, Mask
 from parameterize.spline.body import Body
 
-from .groups import Layout, OnPatches
+from .groups import CoefficientLayout, OnPatches
 from .partition import partition
 from .processes import Messenger, agreed
 from .space import TrialSpace
@@ -157,7 +157,7 @@ class Parted(Glued):
         """Return the coefficients (c, n_u, n_v, n_w) of every patch of the body from those of this process."""
         own, found = self.layout.joined(coefficients), [np.empty(0)] * len(self.owners)
         numbers = list(map(self._patches_of, range(int(self.owners.max()) + 1)))
-        layouts = [Layout.of([self.whole_body.spaces[number] for number in part]) for part in numbers]
+        layouts = [CoefficientLayout.of([self.whole_body.spaces[number] for number in part]) for part in numbers]
         sizes = [own.components * int(layout.starts[-1]) for layout in layouts]
         each = np.split(self.messenger.gather(own.flat, sizes), np.cumsum(sizes)[:-1])
         for part, layout, flat in zip(numbers, layouts, each, strict=True):

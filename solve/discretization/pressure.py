@@ -17,7 +17,7 @@ from parameterize.spline.body import shared_numbers
 from parameterize.spline.bspline import collocation, greville
 from parameterize.spline.interface import Interface
 
-from .groups import Layout
+from .groups import CoefficientLayout
 from .space import TrialSpace
 
 LEAST_DEGREE = 2  # of displacements that have pressures
@@ -41,7 +41,9 @@ class Pressures:
     transposed: csr_array
 
     @classmethod
-    def of(cls, layout: Layout, spaces: Sequence[TrialSpace], interfaces: Sequence[Interface]) -> "Pressures":
+    def of(
+        cls, layout: CoefficientLayout, spaces: Sequence[TrialSpace], interfaces: Sequence[Interface]
+    ) -> "Pressures":
         """Return the pressures of patches with the given trial spaces, continuous across the given interfaces."""
         known: dict[bytes, Array] = {}
 
@@ -60,7 +62,9 @@ class Pressures:
         return int(self.matrix.shape[1])
 
 
-def _joined(layout: Layout, each: Sequence[Extraction], numbers: Sequence[IntArray], count: int) -> csr_array:
+def _joined(
+    layout: CoefficientLayout, each: Sequence[Extraction], numbers: Sequence[IntArray], count: int
+) -> csr_array:
     """Return the matrix of `Pressures`."""
     patterns: dict[tuple[int, ...], csr_array] = {}
     parts = []

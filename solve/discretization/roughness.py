@@ -14,7 +14,7 @@ from ..field import Points
 from . import kernels
 from .quadrature import GaussRule, operator_rule
 from .space import TrialSpace
-from .stack import Piece, Stack
+from .stack import PatchStack, Piece
 
 SAMPLES = 6  # places a direction, each three neighbouring spans, at which a map is measured
 LIMIT = 0.03  # trained maps reach 0.06 and more after two refinements, the twisted cube 0.02 with 14 elements
@@ -86,7 +86,7 @@ def roughness(patches: Sequence[Measured]) -> list[bool]:
 def _are_rough(patches: Sequence[Measured], rules: Sequence[GaussRule]) -> list[bool]:
     """Return whether each of some patches of one shape and law is rough, from the rules of their stencils."""
     volumes, spaces, tensors, _ = zip(*patches, strict=True)
-    stack = Stack([space.whole for space in spaces], rules, 1, volumes, (0, len(patches)))
+    stack = PatchStack([space.whole for space in spaces], rules, 1, volumes, (0, len(patches)))
     factors = np.empty((len(patches), stack.shape[0], 6, *stack.plane_shape))
 
     def fill(piece: Piece) -> None:

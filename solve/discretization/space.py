@@ -27,8 +27,7 @@ class TrialSpace:
     """Describe scalar trivariate splines on the unit cube, of three degrees on three open knot vectors on [0, 1].
 
     dirichlet: names of the cube's faces on which boundary data fix the coefficients. outer: names of the faces on the
-    body's boundary; the others are glued to faces of patches. periodic: the directions along which a patch is glued to
-    itself, u0 to u1, as a ring is; both ends have their own coefficients, which `Glued` makes one.
+    body's boundary; the others are glued to faces of patches.
 
     The operators ask a space for the rows of their process, which are functions of u, and for sums over all processes.
     A single process has all rows and sends nothing; `Slab` is the space of a process that has some of the rows.
@@ -38,7 +37,6 @@ class TrialSpace:
     knots: Knots
     dirichlet: Collection[str] = FACE_NAMES
     outer: Collection[str] = FACE_NAMES
-    periodic: Collection[int] = ()
 
     @property
     def whole(self) -> "TrialSpace":

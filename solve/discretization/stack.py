@@ -1,4 +1,4 @@
-"""Defines Stack: patches of one shape, whose maps, bases and quadrature rules are arrays with a leading dimension.
+"""Defines PatchStack: patches of one shape, whose maps, bases and quadrature rules are arrays with a leading dimension.
 
 Work on a stack comes in pieces: whole patches where these are small, otherwise a patch's planes of points with a fixed
 u. Sums over a patch have one order, whatever the number of threads.
@@ -47,7 +47,7 @@ class Stacked(NamedTuple):
     shape: Hashable = None
 
 
-def stacks_of(patches: Sequence[Stacked], threads: int) -> Iterator[tuple[list[int], Stack]]:
+def stacks_of(patches: Sequence[Stacked], threads: int) -> Iterator[tuple[list[int], PatchStack]]:
     """Yield the stacks of patches with the numbers of their patches, those with the same data one after another."""
     found: dict[Any, dict[Any, list[int]]] = defaultdict(lambda: defaultdict(list))
     for number, (volume, space, rule, same, shape) in enumerate(patches):
@@ -59,11 +59,11 @@ def stacks_of(patches: Sequence[Stacked], threads: int) -> Iterator[tuple[list[i
         ]
         ends = np.cumsum([0, *map(len, runs.values())]).tolist()
         volumes, spaces, of_points, _, _ = zip(*(patches[number] for number in numbers), strict=True)
-        yield numbers, Stack(spaces, of_points, threads, volumes, ends)
+        yield numbers, PatchStack(spaces, of_points, threads, volumes, ends)
 
 
 @dataclass(frozen=True, eq=False)
-class Stack:
+class PatchStack:
     """Hold k patches of equal degrees and equal numbers of control points, functions and quadrature points.
 
     runs: the ends of runs of patches with the same law and data, which are evaluated together: from 0 to k.

@@ -16,7 +16,7 @@ from parameterize.arrays import Array, IntArray, Mask
 from parameterize.spline.body import shared_numbers
 from parameterize.spline.interface import Interface
 
-from .groups import Layout, OnPatches
+from .groups import CoefficientLayout, OnPatches
 from .processes import Processes
 from .space import TrialSpace
 
@@ -232,9 +232,9 @@ class Glued:
         return np.flatnonzero(~self.fixed & self.is_own)
 
     @cached_property
-    def layout(self) -> Layout:
+    def layout(self) -> CoefficientLayout:
         """Return where the coefficients of each patch stand in an array of all."""
-        return Layout.of(self.spaces)
+        return CoefficientLayout.of(self.spaces)
 
     @cached_property
     def places(self) -> list[IntArray]:

@@ -21,7 +21,7 @@ from ..discretization.groups import OnPatches
 from ..discretization.unknowns import Glued, Unknowns, Window
 from .device_matrix import DeviceMatrix, on_device, sparse
 from .low_order import LowOrder
-from .multigrid import Level, Multigrid
+from .multigrid import GridLevel, Multigrid
 from .preconditioner import Componentwise, FastDiagonalization
 
 
@@ -127,13 +127,13 @@ def _multigrid(cycle: Multigrid, device: str) -> Multigrid:
     return Multigrid(levels, lambda x: on_device(cycle.coarsest(x.cpu().numpy()), device))  # type: ignore[attr-defined]
 
 
-def _level(level: Level, device: str) -> Level:
+def _level(level: GridLevel, device: str) -> GridLevel:
     matrix: Any = sparse(level.matrix.tocsr(), device)
     coarser: Any = _Interpolation(level.coarser, device)
     return _DeviceLevel(level.unknowns, matrix, on_device(level.inverses, device), level.largest, coarser)
 
 
-class _DeviceLevel(Level):
+class _DeviceLevel(GridLevel):
     def product(self, x: Any) -> Any:
         return (self.matrix @ x.reshape(-1)).reshape(x.shape)
 

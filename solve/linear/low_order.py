@@ -19,7 +19,7 @@ from parameterize.arrays import Array, IntArray, Mask
 from parameterize.spline.body import Body
 
 from ..discretization.grouped import BodyMatrix, assemble_body
-from ..discretization.groups import Layout, OnPatches
+from ..discretization.groups import CoefficientLayout, OnPatches
 from ..discretization.operator import Operator, diagonals
 from ..discretization.quadrature import GaussRule, gauss_rule
 from ..discretization.unknowns import Glued
@@ -159,7 +159,7 @@ def _entries(
     return keys // count, keys % count, entries
 
 
-def _unit(layout: Layout, components: int, component: int, colour: Sequence[int]) -> OnPatches:
+def _unit(layout: CoefficientLayout, components: int, component: int, colour: Sequence[int]) -> OnPatches:
     """Return one at the nodes of a colour in one component, zero elsewhere."""
     unit, (a, b, c) = layout.empty(components), colour
     for part in unit.in_groups:
@@ -172,7 +172,7 @@ def _by_component(products: OnPatches) -> Array:
     return np.concatenate([np.moveaxis(part, 1, 0).reshape(part.shape[1], -1) for part in products.in_groups], axis=1)
 
 
-def _seen(layout: Layout, group: int) -> IntArray:
+def _seen(layout: CoefficientLayout, group: int) -> IntArray:
     """Return the place (27, nodes) of the only node of each colour that each node of a group sees; -1 for none."""
     first = layout.groups[group][0]
     shape, count = layout.shapes[first], len(layout.groups[group])
@@ -201,7 +201,7 @@ def surveyed(matrix: BodyMatrix) -> Survey:
     return survey_of(matrix.layout, components, blocks)
 
 
-def survey_of(layout: Layout, components: int, blocks: Iterable[Sequence[Operator]]) -> Survey:
+def survey_of(layout: CoefficientLayout, components: int, blocks: Iterable[Sequence[Operator]]) -> Survey:
     """Return the survey of operators: of each component those of all patches."""
     diagonal, free = layout.empty(components), np.ones(len(layout.shapes), dtype=bool)
     for component, parts in enumerate(blocks):

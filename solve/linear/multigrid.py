@@ -26,7 +26,7 @@ OPEN = 1e-8  # share of the diagonal that is added to the coarsest matrix of a b
 
 
 @dataclass(frozen=True, eq=False)
-class Level:
+class GridLevel:
     """Smooth on one grid. Vectors have the shape (m, c), for c components.
 
     unknowns: those of this process. matrix: (k c, k c) in blocks of c, the part of the patches here. inverses: (m, c,
@@ -41,7 +41,7 @@ class Level:
     coarser: csr_array
 
     @classmethod
-    def of(cls, unknowns: Glued, matrix: bsr_array, coarser: csr_array) -> "Level":
+    def of(cls, unknowns: Glued, matrix: bsr_array, coarser: csr_array) -> "GridLevel":
         """Return the level of a matrix; coarser: the interpolation to all unknowns of the body."""
         diagonal = _diagonal(matrix)
         own = unknowns.without_copies(diagonal.reshape(len(diagonal), -1))
@@ -92,7 +92,7 @@ class Multigrid:
     coarsest: solves on the last grid.
     """
 
-    levels: Sequence[Level]
+    levels: Sequence[GridLevel]
     coarsest: Callable[[Array], Array]
 
     @classmethod
@@ -103,7 +103,7 @@ class Multigrid:
         whole, also one that is no coarser where the first has few nodes. is_open: whether motions of the body may cost
         no energy.
         """
-        levels: list[Level] = []
+        levels: list[GridLevel] = []
         is_shared = unknowns.of_body is not unknowns
         while grid.count > SMALL or (is_shared and not levels):
             coarser = grid.coarser() if grid.count > SMALL else None
@@ -111,7 +111,7 @@ class Multigrid:
                 break
             coarser = coarser or grid
             interpolation = grid.interpolation(coarser)
-            levels.append(Level.of(unknowns, matrix, interpolation))
+            levels.append(GridLevel.of(unknowns, matrix, interpolation))
             wide = kron(interpolation[unknowns.rows], np.eye(matrix.blocksize[0]), format="bsr")
             coarse = unknowns.processes.total(wide.T @ matrix @ wide)
             matrix, grid, unknowns = bsr_array(coarse, blocksize=matrix.blocksize), coarser, coarser.unknowns

@@ -32,8 +32,8 @@ COLUMNS, LAYERS = 4096, 8  # in a piece of work
 class FastDiagonalization:
     """Apply D (U (x) U (x) U) L^-1 (U (x) U (x) U)^T D to residuals of the free coefficients.
 
-    vectors: per direction (n, n), generalized eigenvectors in columns; in a periodic direction (n, n - 1), whose first
-    and last rows are the same. inverse, scaling: the diagonals L^-1, of the eigenvectors, and D, (n_u, n_v, n_w).
+    vectors: per direction (n, n), generalized eigenvectors in columns. inverse, scaling: the diagonals L^-1, of the
+    eigenvectors, and D, (n_u, n_v, n_w).
     singular: whether constants are in the operator's kernel (no Dirichlet face, no reaction, no Robin face); the
     preconditioner then stays in their orthogonal complement. local: the part that is added for a sheared map (`shear`).
     weakness: the part that had to be left out, as a sentence for the report; "" for none. For a slab, `inverse` has the
@@ -112,16 +112,18 @@ class FastDiagonalization:
         return result
 
 
-def fast_diagonalization(operator: Operator) -> FastDiagonalization:
+def fast_diagonalization(operator: Operator, diagonal: Array | None = None) -> FastDiagonalization:
     """Return the preconditioner of an operator restricted to its free coefficients.
 
-    Where the local part does not give finite numbers it is left out; where no part does, the inverse of the diagonal is
-    returned. All processes that share the space call this function.
+    diagonal: `operator.diagonal()` where it is known. Where the local part does not give finite numbers it is left out;
+    where no part does, the inverse of the diagonal is returned. All processes that share the space call this function.
     """
     with np.errstate(all="ignore"):  # it is looked at afterwards
-        found = _without_local(operator)
+        own = operator.diagonal() if diagonal is None else diagonal.copy()
+        operator.space.add(own)
+        found = _without_local(operator, own[operator.space.window])
         if not _is_usable(found):
-            return _of_the_diagonal(operator, found.singular)
+            return _of_the_diagonal(operator, own[operator.space.window], found.singular)
         if found.singular or not helps(operator):
             return found
         whole = replace(found, local=incomplete_cholesky(operator))
@@ -156,8 +158,11 @@ def _is_usable(preconditioner: FastDiagonalization) -> bool:
     return all(preconditioner.space.shared(bool(np.isfinite(preconditioner(residual)).all())))
 
 
-def _without_local(operator: Operator) -> FastDiagonalization:
-    """Return fast diagonalization without a local part; its numbers are not finite for extreme coefficients."""
+def _without_local(operator: Operator, diagonal: Array) -> FastDiagonalization:
+    """Return fast diagonalization without a local part; its numbers are not finite for extreme coefficients.
+
+    diagonal: that of the operator, on the own free coefficients.
+    """
     space = operator.space
     here = {name: face.stiffness(operator.component) for name, face in operator.faces.items()}
     stiff = {name: float(space.total(here.get(name, 0.0))) for name in FACE_NAMES}
@@ -166,11 +171,11 @@ def _without_local(operator: Operator) -> FastDiagonalization:
     reaction = mean_mass / float(np.prod(averages))
     values, vectors = zip(*(_eigh(slope, mass) for slope, mass in zip(slopes, masses, strict=True)), strict=True)
     spectrum = values[0][:, None, None] + values[1][space.columns, None] + values[2] + reaction
-    scaling = _scaling(operator, _unfolded(space, _diagonal(space, slopes, masses, reaction)))
+    scaling = _scaling(_diagonal(space, slopes, masses, reaction), diagonal)
     singular = not space.dirichlet and reaction == 0.0 and not any(stiff.values())
     if singular:
         spectrum[0, : int(space.columns.start == 0), 0] = np.inf
-    u, v, w = (_ends_joined(rows, 0) if axis in space.periodic else rows for axis, rows in enumerate(vectors))
+    u, v, w = vectors
     return FastDiagonalization(space, (u, v, w), 1.0 / spectrum, scaling, singular, operator.threads)
 
 
@@ -183,12 +188,12 @@ def _eigh(slope: Array, mass: Array) -> tuple[Array, Array]:
     return values, vectors
 
 
-def _of_the_diagonal(operator: Operator, singular: bool) -> FastDiagonalization:
+def _of_the_diagonal(operator: Operator, diagonal: Array, singular: bool) -> FastDiagonalization:
     """Return the inverse of the operator's diagonal as a FastDiagonalization, whose eigenvectors are unit vectors."""
     space = operator.space
     u, v, w = (np.eye(free.stop - free.start) for free in space.free)
     spectrum = np.ones((len(u), space.columns.stop - space.columns.start, len(w)))
-    scaling = _scaling(operator, 1.0)
+    scaling = _scaling(1.0, diagonal)
     return FastDiagonalization(space, (u, v, w), spectrum, scaling, singular, operator.threads, weakness=NO_FACTORS)
 
 
@@ -210,31 +215,9 @@ def _directional_matrices(
         for end, name in zip((0, -1), FACE_NAMES[2 * axis : 2 * axis + 2], strict=True):
             # one function only is nonzero at the end, with value 1
             slope[end, end] += stiff[name] * averages[axis] / float(np.prod(averages))
-        ring = axis in operator.space.periodic
-        slopes.append(_folded(slope) if ring else slope[free, free])
-        masses.append(_folded(mass) if ring else mass[free, free])
+        slopes.append(slope[free, free])
+        masses.append(mass[free, free])
     return slopes, masses, averages
-
-
-def _folded(matrix: Array) -> Array:
-    """Return the matrix (n - 1, n - 1) of a direction whose first and last function are one."""
-    folded = matrix[:-1, :-1].copy()
-    folded[0] += matrix[-1, :-1]
-    folded[:, 0] += matrix[:-1, -1]
-    folded[0, 0] += matrix[-1, -1]
-    return folded
-
-
-def _ends_joined(values: Array, axis: int) -> Array:
-    """Return values with those of the first function repeated for the last one."""
-    return np.concatenate([values, np.take(values, [0], axis=axis)], axis=axis)
-
-
-def _unfolded(space: TrialSpace, diagonal: Array) -> Array:
-    """Return a diagonal on the own free coefficients, those at both ends of periodic directions included."""
-    for axis in space.periodic:
-        diagonal = _ends_joined(diagonal, axis)
-    return diagonal
 
 
 def _diagonal(space: TrialSpace, slopes: list[Array], masses: list[Array], reaction: float) -> Array:
@@ -248,22 +231,8 @@ def _diagonal(space: TrialSpace, slopes: list[Array], masses: list[Array], react
     return np.asarray(diagonal + reaction * np.einsum("i,j,k->ijk", *mass))
 
 
-def _scaling(operator: Operator, diagonal: Array | float) -> Array:
-    """Return the square root of a diagonal over the operator's diagonal, on the own free coefficients.
-
-    It is zero where the operator's diagonal is zero, because the law does not act on these coefficients.
-    """
-    found = operator.diagonal()
-    operator.space.add(found)
-    for axis in operator.space.periodic:
-        both = np.moveaxis(found, axis, 0)
-        both[0] += both[-1]
-        both[-1] = both[0]
-    return scaling_of(diagonal, found[operator.space.window])
-
-
-def scaling_of(diagonal: Array | float, wanted: Array) -> Array:
-    """Return the square root of a diagonal over a wanted one, zero where the wanted one is zero.
+def _scaling(diagonal: Array | float, wanted: Array) -> Array:
+    """Return the square root of a diagonal over a wanted one, zero where the law does not act and that one is zero.
 
     A folded map has diagonal entries below zero; their size is all a scaling can use.
     """
