@@ -93,7 +93,7 @@ def right_handed(body: Body) -> Body:
     if not any(left):
         return body
     patches = [_with_w_reversed(patch) if back else patch for patch, back in zip(body, left, strict=True)]
-    return Body(tuple(patches), tuple(_between(interface, left) for interface in body.interfaces))
+    return Body(tuple(patches), tuple(_between(interface, left) for interface in body.interfaces), body.solids)
 
 
 def _with_w_reversed(patch: BSplineVolume) -> BSplineVolume:

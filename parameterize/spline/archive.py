@@ -3,7 +3,8 @@
 Each array has the patch before its name: p0_degrees, p0_knots_u, .., p1_degrees, .. Of many patches those with equal
 degrees and knots are one array, with the group before its name: g0_patches (k,) the numbers of its patches, g0_degrees,
 g0_knots_u, .. once for all of them, and all other arrays with one row a patch, such as g0_control_points (k, n_u, ..).
-Rational patches also have weights. A row of `interfaces` has seven whole numbers, see interface_rows.py.
+Rational patches also have weights. A row of `interfaces` has seven whole numbers, see interface_rows.py. A body of
+several solids has `solids`, the number of each patch's solid, and `solid_names`.
 """
 
 import re
@@ -17,6 +18,7 @@ from ..arrays import Array, Floats
 from ..files import array_names, load_arrays, save_arrays
 from .interface import Interface
 from .interface_rows import COLUMNS, interfaces_of, rows_of
+from .solids import PatchSolids
 from .volume import AXES, FACE_NAMES, BSplineVolume
 
 MOST_APART = 1000  # patches with arrays of their own: a file of more arrays takes long to write and read
@@ -25,9 +27,23 @@ BASIS = ("degrees", *(f"knots_{axis}" for axis in AXES))  # what the patches of 
 PatchArrays = Mapping[str, Floats]  # of one patch, by their names: those of BASIS and others
 
 
-def save_patches(path: str | Path, patches: Sequence[BSplineVolume], interfaces: Sequence[Interface]) -> None:
-    """Write patches and interfaces; atomic."""
-    save_arrays(path, interfaces=rows_of(interfaces), **named_arrays([_arrays(patch) for patch in patches]))
+def save_patches(
+    path: str | Path, patches: Sequence[BSplineVolume], interfaces: Sequence[Interface], solids: PatchSolids
+) -> None:
+    """Write patches, interfaces and, where there are several solids or names, the solid of each patch; atomic."""
+    arrays = named_arrays([_arrays(patch) for patch in patches])
+    save_arrays(path, interfaces=rows_of(interfaces), **arrays, **_solid_arrays(solids))
+
+
+def _solid_arrays(solids: PatchSolids) -> dict[str, Floats]:
+    """Return the arrays of the solids of patches by their names in a file; none of one solid without a name."""
+    return {} if solids.is_plain else {"solids": solids.numbers, "solid_names": np.array(solids.names, dtype=np.str_)}
+
+
+def load_solids(path: str | Path) -> PatchSolids:
+    """Read the solids of patches, all of one where the file has none. Raises ValueError as `PatchSolids`."""
+    arrays = load_arrays(path, (), ("solids", "solid_names"))
+    return PatchSolids(arrays["solids"], tuple(arrays["solid_names"].tolist())) if len(arrays) == 2 else PatchSolids()
 
 
 def _arrays(patch: BSplineVolume) -> PatchArrays:

@@ -1,7 +1,7 @@
 """Defines Body: one spline volume or several, glued along whole faces, and the numbers of shared control points."""
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import compress
 from math import prod
@@ -17,11 +17,12 @@ from scipy.spatial import cKDTree
 
 from ..arrays import Array, Floats, IntArray, Mask
 from ..display import Brief, Shown, above
-from .archive import is_of_patches, load_patches, save_patches
+from .archive import is_of_patches, load_patches, load_solids, save_patches
 from .interface import WEIGHT_TOLERANCE, Face, Interface, axis_side, face_label, face_layer, knots_agree
 from .interface_rows import face_numbers, gaps, group_places, interfaces_of, kinds, oriented, rows_of
 from .location import locate
 from .patch_groups import PatchGroup, groups_of
+from .solids import PatchSolids
 from .volume import FACE_NAMES, BSplineVolume, demand_volume
 
 if TYPE_CHECKING:
@@ -47,11 +48,14 @@ class Body(Brief, Shown):
     interfaces : tuple of Interface
         Pairs of faces with equal degrees, knots, control points and, up to a factor, weights; a face is glued once at
         most.
+    solids : PatchSolids, or sequence of str or of int
+        The solid of each patch, by its name or its number, where the body has several: each has its own material.
 
     Raises
     ------
     ValueError
-        Where two faces of an interface do not have the same trace; the message names the faces.
+        Where two faces of an interface do not have the same trace; the message names the faces. Where `solids` are
+        those of more or fewer patches.
 
     Examples
     --------
@@ -65,6 +69,7 @@ class Body(Brief, Shown):
 
     patches: tuple[BSplineVolume, ...]
     interfaces: tuple[Interface, ...] = ()
+    solids: PatchSolids = field(default_factory=PatchSolids, repr=False)
 
     def __post_init__(self) -> None:
         _demand_list(self.patches, Iterable)
@@ -74,6 +79,7 @@ class Body(Brief, Shown):
             raise ValueError("a body has one patch or more")
         for patch in self.patches:
             demand_volume(patch)
+        object.__setattr__(self, "solids", PatchSolids.of(self.solids, len(self.patches)))
         for interface in self.interfaces:
             if not isinstance(interface, Interface):
                 raise TypeError(f"interfaces must be Interface objects, got {interface!r:.80}")
@@ -100,12 +106,18 @@ class Body(Brief, Shown):
             raise ValueError("every face is glued, so that the body has no boundary: is a patch given twice?")
 
     @classmethod
-    def from_patches(cls, patches: Sequence[BSplineVolume], tolerance: float = TOLERANCE) -> "Body":
+    def from_patches(
+        cls,
+        patches: Sequence[BSplineVolume],
+        tolerance: float = TOLERANCE,
+        solids: PatchSolids | Sequence[str] | Sequence[int] = (),
+    ) -> "Body":
         """Return the body of patches, glued where two faces have the same control points.
 
         tolerance: the largest distance of two control points that are taken for one, as a share of the body's size;
-        they become one, that of the patch that comes first. Raises ValueError where two faces are the same
-        surface, but do not have the same degrees, knots and weights, and where three faces are the same.
+        they become one, that of the patch that comes first. solids: the name or the number of each patch's solid.
+        Raises ValueError where two faces are the same surface, but do not have the same degrees, knots and weights,
+        where three faces are the same, and where `solids` are those of more or fewer patches.
         """
         _demand_list(patches, Sequence)
         given = tuple(patches)
@@ -117,7 +129,7 @@ class Body(Brief, Shown):
             raise ValueError(f"tolerance must be a share of the body's size, from 0 to 1, got {tolerance!r:.80}")
         size = size_of(given)
         found = interfaces_of(_matches(given, tolerance * size, size))
-        return cls(_merged(given, found), found)
+        return cls(_merged(given, found), found, PatchSolids.of(solids, len(given)))
 
     @classmethod
     def from_splinepy(cls, splines: Any) -> "Body":
@@ -140,11 +152,11 @@ class Body(Brief, Shown):
         return above("figures.map").plot_body(self, what, file)
 
     def save(self, path: str | Path) -> None:
-        """Write the patches and interfaces as volume.npz; atomic. One patch that is not glued is a volume there."""
+        """Write patches, interfaces and solids as volume.npz; atomic. One patch that is not glued is a volume there."""
         if self.is_single:
             self.only.save(path)
         else:
-            save_patches(path, self.patches, self.interfaces)
+            save_patches(path, self.patches, self.interfaces, self.solids)
 
     @classmethod
     def load(cls, path: str | Path) -> "Body":
@@ -156,7 +168,7 @@ class Body(Brief, Shown):
             return cls((BSplineVolume.load(path),))
         patches, interfaces = load_patches(path)
         try:
-            return cls(patches, interfaces)
+            return cls(patches, interfaces, load_solids(path))
         except ValueError as error:
             raise ValueError(f"{path}: {error}") from None
 

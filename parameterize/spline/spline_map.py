@@ -8,7 +8,7 @@ sides continue each other, so that a knot inserted into the one must be inserted
 to its block through a loop of others, turned, is one with a slab of another direction there, or with its mirror image.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise
 
@@ -18,12 +18,13 @@ from ..arrays import Array, Floats, IntArray, Knots, Mask
 from .body import Body, numbers_of_classes, shared_numbers
 from .bspline import breakpoints, greville, interpolate_grid
 from .interface import Interface, axis_side
+from .solids import PatchSolids
 from .volume import BSplineVolume
 
 
 @dataclass(frozen=True, eq=False)
 class ControlNets:
-    """Describe the control nets of blocks: the degree in all directions, the knots of each block, their interfaces.
+    """Describe the control nets of blocks: degree in all directions, knots of each block, interfaces, and solids.
 
     A cube's face has the number 2 * axis + side; a face of a body has the number 6 * block + face.
     """
@@ -31,6 +32,7 @@ class ControlNets:
     degree: int
     knots: tuple[Knots, ...]
     interfaces: tuple[Interface, ...] = ()
+    solids: PatchSolids = field(default_factory=PatchSolids)
 
     @property
     def is_single(self) -> bool:
@@ -165,7 +167,8 @@ class SplineMap:
     @property
     def body(self) -> Body:
         """Return the same map as a body, a patch for each block."""
-        return Body(tuple(self.patch(k) for k in range(len(self.nets.knots))), self.nets.interfaces)
+        patches = tuple(self.patch(k) for k in range(len(self.nets.knots)))
+        return Body(patches, self.nets.interfaces, self.nets.solids)
 
     def with_control(self, control: Array) -> "SplineMap":
         """Return the map on the same knots with other control points (3, n)."""

@@ -19,6 +19,7 @@ from ..progress import timed
 from ..quality.distances import nearest_on_boundary
 from ..spline.interface import Interface
 from ..spline.sampled_boundary import SampledBoundary
+from ..spline.solids import PatchSolids
 from ..spline.spline_map import ControlNets, SplineMap
 from ..spline.volume import FACE_NAMES
 from ..threads import one_blas_thread
@@ -85,8 +86,10 @@ def kept_blocks(checkpoints: Checkpoints, lay: Callable[[], SplineMap]) -> Splin
         "control": first.control,
         "knots": np.concatenate([row for knots in nets.knots for row in knots]),
         "lengths": np.array([[len(row) for row in knots] for knots in nets.knots]),
+        "solids": nets.solids.numbers,
     }
-    state = {"degree": nets.degree, "interfaces": [asdict(one) for one in nets.interfaces]}
+    interfaces = [asdict(one) for one in nets.interfaces]
+    state = {"degree": nets.degree, "interfaces": interfaces, "solid_names": nets.solids.names}
     checkpoints.save(_CHECKPOINT, arrays, state)
     return first
 
@@ -97,7 +100,8 @@ def _loaded(arrays: dict[str, NDArray[Any]], state: dict[str, Any]) -> SplineMap
     rows = np.split(arrays["knots"], np.cumsum(lengths.ravel())[:-1])
     knots = tuple((rows[k], rows[k + 1], rows[k + 2]) for k in range(0, len(rows), 3))
     interfaces = tuple(_interface(**values) for values in state["interfaces"])
-    return SplineMap(ControlNets(state["degree"], knots, interfaces), arrays["control"])
+    solids = PatchSolids(arrays["solids"], tuple(state["solid_names"])) if "solids" in arrays else PatchSolids()
+    return SplineMap(ControlNets(state["degree"], knots, interfaces, solids), arrays["control"])
 
 
 def _interface(first: list[Any], second: list[Any], swapped: bool, flipped: list[bool]) -> Interface:
