@@ -6,8 +6,13 @@ a hole of radius 8 through the foot.
 
 from __future__ import annotations
 
+import json
+import subprocess
+import sys
+from importlib import import_module
 from math import pi
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -32,8 +37,11 @@ import iga_nn
 from iga_nn.cli.commands import main
 from iga_nn.report import document as report
 from iga_nn.workflow.regions import check_regions
+from parameterize.surface.brep import kept_brep
+from parameterize.surface.geometry import normals_and_areas
 from parameterize.surface.readers import cad
 from parameterize.surface.readers.common import SurfaceFile
+from parameterize.surface.readers.file import read_mesh
 from parameterize.surface.surface import MeshError, bodies_in, load_surface
 
 VOLUME = 6 * 4 * 1 + 1 * 4 * 4 + 0.5 * pi * 2**2  # foot, wall, half a disc at the end
@@ -42,10 +50,17 @@ BACK, FRONT, HOLE = "group:face1", "group:face8", "group:face9"
 NAMES = {"MM": "mm", "INCH": "in", "M": "m"}
 
 
-@pytest.fixture(scope="module")
-def part():
-    """The bytes of a bracket by kind and unit."""
+@pytest.fixture
+def part(monkeypatch):
+    """The bytes of a bracket by kind and unit; OpenCASCADE, which takes seconds to load, runs in this process."""
     pytest.importorskip("OCP")
+    program = import_module("parameterize.surface.readers.opencascade")
+
+    def run(command, **options):
+        program.main(*command[2:])
+        return subprocess.CompletedProcess(command, 0)
+
+    monkeypatch.setattr(cad, "subprocess", SimpleNamespace(**vars(subprocess) | {"run": run}))
     return solid_model
 
 
@@ -83,6 +98,38 @@ def test_a_bracket_with_a_hole_is_held_and_loaded_at_faces_by_name(in_folder):
     assert areas[BACK] == pytest.approx(40 * 50, rel=0.05) and areas[FRONT] == pytest.approx(40 * 10, rel=0.05)
     reaction = found["elasticity"]["levels"][0]["reactions"][f"fix {BACK!r}"]
     assert reaction[2] == pytest.approx(areas[FRONT], rel=1e-6)
+
+
+MEASURED = """
+import json, sys
+from netgen.occ import OCCGeometry
+print(json.dumps([(face.mass, *face.center) for face in OCCGeometry(sys.argv[1]).shape.faces]))
+"""
+
+
+@pytest.mark.parametrize("unit", ["MM", "INCH"])
+def test_netgen_finds_the_exact_faces_in_the_order_of_their_numbers(unit, part, tmp_path):
+    pytest.importorskip("netgen")
+    surface = read(tmp_path, part("step", unit), deflection=1e-3)
+    (tmp_path / "part.brep").write_bytes(surface.brep)
+    rows = json.loads(subprocess.check_output([sys.executable, "-c", MEASURED, tmp_path / "part.brep"]))
+    assert len(rows) == len(surface.groups)
+    for number, (area, *middle) in enumerate(rows, start=1):
+        own = np.flatnonzero(surface.brep_faces == number)
+        assert np.array_equal(own, surface.groups[f"face{number}"])
+        areas = normals_and_areas(surface.vertices, surface.faces[own])[1]
+        centre = np.average(surface.vertices[surface.faces[own]].mean(axis=1), axis=0, weights=areas)
+        assert areas.sum() == pytest.approx(area, rel=1e-3) and centre == pytest.approx(middle, abs=1e-3)
+
+
+def test_the_exact_faces_are_those_of_the_chosen_solid_and_of_a_shape_that_repairs_leave(part, tmp_path):
+    lid = read(tmp_path, of(box(), box((1, 1, 1), (9, 0, 0))), component=1)
+    assert lid.brep.count(b"\nSo\n") == 1 and list(lid.groups) == [f"face{k}" for k in range(7, 13)]
+    assert np.unique(lid.brep_faces).tolist() == [1, 2, 3, 4, 5, 6]
+    raw = read_mesh(tmp_path / "part.step", 1000)
+    assert kept_brep(raw, np.arange(24)).text == raw.brep.text
+    for old in (np.arange(23), np.array([*range(12), -1])):
+        assert kept_brep(raw, old).text == b""
 
 
 def test_deflection_is_the_distance_from_curved_faces(part, tmp_path):
@@ -414,9 +461,10 @@ def test_what_is_too_small_for_opencascade_is_refused(part, tmp_path):
         read(tmp_path, step.data())
 
 
-def test_a_damaged_file_is_refused_in_one_line(part, tmp_path, capfd):
+def test_a_damaged_file_is_refused_in_one_line(tmp_path, capfd):
+    pytest.importorskip("OCP")
     path = tmp_path / "bracket.step"
-    path.write_bytes(part()[:9000])
+    path.write_bytes(solid_model()[:9000])
     capfd.readouterr()
     with pytest.raises(MeshError, match="bracket.step: OpenCASCADE cannot read it as STEP"):
         load_surface(path)
@@ -441,7 +489,8 @@ def found(monkeypatch):
     """What OpenCASCADE finds in a file: a box, with these facts."""
 
     def find(**facts):
-        labels = np.stack([np.repeat(np.arange(1, 7), 2), np.ones(12, dtype=int)], axis=1)
+        faces = np.repeat(np.arange(1, 7), 2)
+        labels = np.stack([faces, np.ones(12, dtype=int), faces], axis=1)
         arrays = {"vertices": CORNERS, "faces": ROWS, "labels": labels}
         monkeypatch.setattr(cad, "_run", lambda *asked: (arrays, FACTS | facts))
         return cad.read_step(SurfaceFile(of(box()), 1000, None))

@@ -11,7 +11,7 @@ import numpy as np
 
 from .errors import MeshError, check_face_limit
 from .geometry import doubled_areas
-from .groups import Groups, renumbered
+from .groups import renumbered
 from .surface import Surface, surface_from_arrays
 
 MOST_FITTED = 40_000  # faces: a surface of more is fitted on a copy; below, the copy would hardly be faster
@@ -76,11 +76,13 @@ def _collapsed(surface: Surface, max_faces: int, *, block: bool) -> tuple[Surfac
         raise MeshError(f"{name}: cannot be decimated below {len(faces)} faces: raise --max-faces")
     moved = igl.hausdorff(unit, surface.faces, vertices, faces) / surface.scale
     smaller = surface_from_arrays(surface.from_unit(vertices), faces, surface.name, max_faces=max_faces)
-    groups = _groups(surface, smaller) if surface.groups else {}
-    return replace(smaller, source=surface.source, unit=surface.unit, groups=groups), float(moved)
+    smaller = replace(smaller, source=surface.source, unit=surface.unit)
+    return _labelled(surface, smaller) if surface.groups or surface.brep else smaller, float(moved)
 
 
-def _groups(surface: Surface, smaller: Surface) -> Groups:
-    """Return the groups of the smaller surface: each of its faces has those of the nearest face."""
+def _labelled(surface: Surface, smaller: Surface) -> Surface:
+    """Return the smaller surface whose faces have the groups and the exact face of the nearest face, each."""
     middles = smaller.vertices[smaller.faces].mean(axis=1)
-    return renumbered(surface.groups, surface.part.nearest(middles, doubled_areas(smaller.vertices, smaller.faces)))
+    nearest = surface.part.nearest(middles, doubled_areas(smaller.vertices, smaller.faces))
+    groups, exact = renumbered(surface.groups, nearest), surface.brep_faces[nearest]
+    return replace(smaller, groups=groups, brep=surface.brep, brep_faces=exact)

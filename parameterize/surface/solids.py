@@ -4,12 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..arrays import IntArray
 from .bodies import LARGEST, LISTED, Choice, check_choice
 from .errors import MeshError
 from .geometry import signed_volume
 from .groups import renumbered
-from .readers.common import Solids
+from .readers.common import SolidPart, Solids
 from .readers.file import RawMesh
 
 
@@ -25,15 +24,15 @@ def one_solid(raw: RawMesh, component: Choice) -> tuple[RawMesh, Choice]:
     copies = len(raw.solids) - len(solids)
     told = (f"dropped copies of solids in the same place: {copies}",) if copies else ()
     if len(solids) == 1:
-        return _only(raw, solids[0][1], told), component
-    sizes = "; ".join(f"{k}: {_described(*solid)}" for k, solid in enumerate(solids[:LISTED]))
+        return _only(raw, solids[0], told), component
+    sizes = "; ".join(f"{k}: {_described(solid)}" for k, solid in enumerate(solids[:LISTED]))
     sizes += f"; and {len(solids) - LISTED} more" if len(solids) > LISTED else ""
     if component is None:
         raise MeshError(
             f"{len(solids)} solids ({sizes}): choose one with --component largest or --component N, take each with "
             "`iga-nn batch --split`, or unite them in the program that made them"
         )
-    volumes = [abs(signed_volume(raw.vertices, raw.faces[faces])) for _, faces in solids]
+    volumes = [abs(signed_volume(raw.vertices, raw.faces[one.triangles])) for one in solids]
     chosen = int(np.argmax(volumes)) if component == LARGEST else int(component)
     if chosen >= len(solids):
         raise MeshError(f"component {component} does not exist: there are {len(solids)} solids, from 0 ({sizes})")
@@ -41,30 +40,31 @@ def one_solid(raw: RawMesh, component: Choice) -> tuple[RawMesh, Choice]:
     taken = (
         f"solid {chosen} taken of {len(solids)} ({sizes}), of volume {volumes[chosen]:.3g}; the others have {rest:.3g}"
     )
-    return _only(raw, solids[chosen][1], (*told, taken)), "largest"  # with its voids filled
+    return _only(raw, solids[chosen], (*told, taken)), "largest"  # with its voids filled
 
 
-def _described(name: str, faces: IntArray) -> str:
+def _described(solid: SolidPart) -> str:
     """Return the name of a solid, where it has one, and how many triangles it has."""
-    return f"{name!r:.40}, {len(faces)} faces" if name else f"{len(faces)} faces"
+    return f"{solid.name!r:.40}, " * bool(solid.name) + f"{len(solid.triangles)} faces"
 
 
 def distinct_solids(raw: RawMesh) -> Solids:
     """Return the solids without copies in the same place, those of most faces first."""
-    found: dict[bytes, tuple[str, IntArray]] = {}
-    for name, faces in raw.solids:
-        found.setdefault(raw.vertices[raw.faces[faces]].tobytes(), (name, faces))
-    return tuple(sorted(found.values(), key=lambda solid: (-len(solid[1]), int(solid[1][0]))))
+    found: dict[bytes, SolidPart] = {}
+    for solid in raw.solids:
+        found.setdefault(raw.vertices[raw.faces[solid.triangles]].tobytes(), solid)
+    return tuple(sorted(found.values(), key=lambda solid: (-len(solid.triangles), int(solid.triangles[0]))))
 
 
-def _only(raw: RawMesh, faces: IntArray, notices: tuple[str, ...]) -> RawMesh:
-    """Return the mesh of some faces, with notices."""
-    used, corners = np.unique(raw.faces[faces], return_inverse=True)
+def _only(raw: RawMesh, solid: SolidPart, notices: tuple[str, ...]) -> RawMesh:
+    """Return the mesh of one solid, with notices."""
+    used, corners = np.unique(raw.faces[solid.triangles], return_inverse=True)
     return replace(
         raw,
         vertices=raw.vertices[used],
         faces=corners.reshape(-1, 3),
         notices=(*raw.notices, *notices),
-        groups=renumbered(raw.groups, faces),
+        groups=renumbered(raw.groups, solid.triangles),
         solids=(),
+        brep=solid.brep,
     )

@@ -3,7 +3,7 @@
 import hashlib
 import logging
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,6 +15,7 @@ from ..arrays import Array, IntArray
 from ..display import Brief, Shown
 from . import topology
 from .bodies import Choice, outer_bodies
+from .brep import kept_brep
 from .errors import (
     MeshError,
     check_finite,
@@ -78,6 +79,11 @@ class Surface(Brief, Shown):
         Of lengths, where the file has one, such as mm.
     sharp : float
         The angle in degrees between the normals of two triangles above which their edge is sharp, 40 by default.
+    brep : bytes
+        Of a solid model the exact faces, as a text in the BREP format of OpenCASCADE 7, in the user's units; empty
+        where there is none, or where repairs have changed the shape.
+    brep_faces : (m,) array of int
+        The face of each triangle, in the order of `brep`, counted from 1; 0 for a triangle of none.
 
     Examples
     --------
@@ -102,6 +108,8 @@ class Surface(Brief, Shown):
     groups: Groups
     unit: str = ""
     sharp: float = SHARP
+    brep: bytes = field(default=b"", repr=False)
+    brep_faces: IntArray = field(default_factory=lambda: np.empty(0, dtype=np.int64))
 
     def to_unit(self, points: ArrayLike) -> Array:
         """Return points (..., 3) in the user's units as placed points."""
@@ -347,6 +355,7 @@ def _gate(raw: RawMesh, name: str, source: str, asked: Asked) -> Surface:
     deepest, _ = Solid(points, triangles).deepest()
     unit_scale = signed_volume(points, triangles) ** (-1.0 / 3.0)
     placed = unit_scale * (points - deepest) + 0.5
+    exact = kept_brep(raw, repaired.old)
     return Surface(
         name=name,
         vertices=repaired.vertices,
@@ -360,4 +369,6 @@ def _gate(raw: RawMesh, name: str, source: str, asked: Asked) -> Surface:
         crossings=crossings,
         groups=renumbered(raw.groups, repaired.old),
         unit=raw.unit,
+        brep=exact.text,
+        brep_faces=exact.faces,
     )

@@ -19,10 +19,11 @@ from typing import Any
 
 import numpy as np
 
+from ...arrays import IntArray
 from ..errors import MeshError, check_face_count
 from ..groups import gathered
 from .cad_units import Unit, iges_unit, step_unit
-from .common import DAMAGED, Content, SurfaceFile
+from .common import DAMAGED, Brep, Content, SolidPart, SurfaceFile
 
 INSTALL = "pip install 'iga-nn[cad]'"
 PROGRAM = Path(__file__).with_name("opencascade.py")
@@ -70,14 +71,26 @@ def _read(file: SurfaceFile, kind: str, unit: Unit) -> Content:
     left_out = Counter(facts["left_out"]) + (passed_over(file.data) if kind == "step" else Counter())
     _check(facts, len(arrays["faces"]), left_out)
     check_face_count(len(arrays["faces"]), file.max_faces)
-    faces, owners = arrays["labels"].T
+    faces, owners, own = arrays["labels"].T
     groups = gathered((f"face{value}", np.flatnonzero(faces == value)) for value in np.unique(faces).tolist())
     names = facts["names"]
-    solids = tuple((name, np.flatnonzero(owners == k)) for k, name in enumerate(names, 1)) if len(names) > 1 else ()
-    notices = (*unit.notices, *_notices(facts, left_out))
+    rows = [np.flatnonzero(owners == k) for k in range(1, len(names) + 1)] if len(names) > 1 else []
+    solids = (SolidPart(names[k], row, _brep(arrays, k + 1, own[row])) for k, row in enumerate(rows))
     return Content(
-        arrays["vertices"] / unit.factor, arrays["faces"].tolist(), notices, groups, unit=unit.name, solids=solids
+        arrays["vertices"] / unit.factor,
+        arrays["faces"].tolist(),
+        (*unit.notices, *_notices(facts, left_out)),
+        groups,
+        unit=unit.name,
+        solids=tuple(solids),
+        brep=_brep(arrays, 0, faces),
     )
+
+
+def _brep(arrays: Mapping[str, Any], number: int, faces: IntArray) -> Brep | None:
+    """Return the B-rep of one of the solids, of all for number 0, whose triangles lie on `faces`; None without one."""
+    found = arrays.get(f"brep{number}")
+    return None if found is None else Brep(found.tobytes(), faces)
 
 
 def _check(facts: Mapping[str, Any], count: int, left_out: Counter[str]) -> None:
@@ -119,7 +132,7 @@ def _run(data: bytes, kind: str, deflection: float | None, unit: Unit) -> tuple[
     with tempfile.TemporaryDirectory() as folder:
         source, target = Path(folder, "source"), Path(folder, "target.npz")
         source.write_bytes(data)
-        numbers = (unit.working, 0.0 if deflection is None else deflection * unit.factor, SHARE, ANGLE)
+        numbers = (unit.working, 0.0 if deflection is None else deflection * unit.factor, SHARE, ANGLE, unit.factor)
         command = [sys.executable, str(PROGRAM), str(source), str(target), kind, *map(repr, numbers)]
         try:
             ended = subprocess.run(

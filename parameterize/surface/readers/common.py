@@ -22,7 +22,6 @@ NUMBER = r"[-+]?(?:(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?|nan|inf(?:inity)?)"
 NUMBERS = re.compile(rf"{NUMBER}(?: {NUMBER})*+", re.ASCII | re.IGNORECASE)
 WHOLE_NUMBERS = re.compile(r"[-+]?\d{1,18}(?: [-+]?\d{1,18})*+", re.ASCII)
 
-Solids = tuple[tuple[str, IntArray], ...]  # names and face numbers
 Beside = Callable[[str], bytes]  # from the name that a file gives to another one to its content; raises MeshError
 
 
@@ -41,12 +40,36 @@ class SurfaceFile:
 
 
 @dataclass(frozen=True, eq=False)
+class Brep:
+    """The exact faces of a solid model, of which triangles were made.
+
+    text: in the BREP format of OpenCASCADE 7, in the unit of the lengths. faces: (m,), the face of each triangle, in
+    the order of the text, counted from 1; 0 for a triangle of none.
+    """
+
+    text: bytes
+    faces: IntArray
+
+
+@dataclass(frozen=True, eq=False)
+class SolidPart:
+    """One of several solids of a file: its name, or "", the numbers of its triangles, and its exact faces."""
+
+    name: str
+    triangles: IntArray
+    brep: Brep | None = None
+
+
+Solids = tuple[SolidPart, ...]
+
+
+@dataclass(frozen=True, eq=False)
 class Content:
     """The content of a surface file.
 
     vertices: (n, 3). polygons: the vertex numbers of each face, counted from 0; they may be out of range.
     notices: one line each on data that were left out or changed. groups: numbers of polygons by name. unit: of lengths,
-    "" where the format has none. solids: where there are several, the name of each, or "", and its triangles.
+    "" where the format has none. solids: where there are several. brep: of a solid model.
     """
 
     vertices: Array
@@ -55,6 +78,7 @@ class Content:
     groups: Groups = field(default_factory=dict)
     unit: str = ""
     solids: Solids = ()
+    brep: Brep | None = None
 
 
 def most_bytes(max_faces: int) -> int:

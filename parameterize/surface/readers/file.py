@@ -14,7 +14,7 @@ from ..errors import MeshError, check_face_count, check_finite, check_indices, w
 from ..groups import Groups, few, renumbered
 from ..triangulation import triangulate
 from .cad import read_iges, read_step
-from .common import DAMAGED, Content, Solids, SurfaceFile, most_bytes
+from .common import DAMAGED, Brep, Content, Solids, SurfaceFile, most_bytes
 from .gltf import read_glb, read_gltf
 from .gmsh import read_gmsh
 from .medit import read_medit
@@ -55,7 +55,7 @@ PACKED = (".gz", ".zip")
 class RawMesh:
     """Triangles before any repair: vertices (n, 3), faces (m, 3) with valid indices, groups; sha256 of the source.
 
-    unit: of lengths, "" where it is not known. solids: where there are several, the name of each, and its faces.
+    unit: of lengths, "" where it is not known. solids: where there are several. brep: of a solid model.
     """
 
     vertices: Array
@@ -65,6 +65,7 @@ class RawMesh:
     groups: Groups
     unit: str = ""
     solids: Solids = ()
+    brep: Brep | None = None
 
 
 def read_mesh(path: Path, max_faces: int, deflection: float | None = None) -> RawMesh:
@@ -99,7 +100,7 @@ def read_mesh(path: Path, max_faces: int, deflection: float | None = None) -> Ra
     content = READERS[suffix](SurfaceFile(data, max_faces, beside, deflection))
     vertices, faces, notices, groups = triangles_of(content, max_faces)
     digest = hashlib.sha256(stored).hexdigest()
-    return RawMesh(vertices, faces, digest, unpacked + notices, groups, content.unit, content.solids)
+    return RawMesh(vertices, faces, digest, unpacked + notices, groups, content.unit, content.solids, content.brep)
 
 
 def _endings(name: str) -> tuple[str, str]:

@@ -1,10 +1,11 @@
 """A program of its own: the solids of a STEP or IGES file to the arrays of their triangles, by OpenCASCADE.
 
 `cad.py` runs it with the file, the .npz to write, the kind, the millimetres of the unit in which lengths are wanted,
-the deflection in that unit, 0 for a share of the box's diagonal, that share, and the angle between triangles in
-radians. It imports OCP and numpy alone.
+the deflection in that unit, 0 for a share of the box's diagonal, that share, the angle between triangles in radians,
+and how many of that unit the file's has. It imports OCP and numpy alone.
 """
 
+import io
 import json
 import sys
 from collections import Counter
@@ -16,10 +17,12 @@ import numpy as np
 from OCP.Bnd import Bnd_Box
 from OCP.BRep import BRep_Builder, BRep_Tool
 from OCP.BRepBndLib import BRepBndLib
-from OCP.BRepBuilderAPI import BRepBuilderAPI_Sewing
+from OCP.BRepBuilderAPI import BRepBuilderAPI_Sewing, BRepBuilderAPI_Transform
 from OCP.BRepCheck import BRepCheck_Analyzer
 from OCP.BRepGProp import BRepGProp
 from OCP.BRepMesh import BRepMesh_IncrementalMesh
+from OCP.BRepTools import BRepTools
+from OCP.gp import gp_Pnt, gp_Trsf
 from OCP.GProp import GProp_GProps
 from OCP.IFSelect import IFSelect_RetDone
 from OCP.IGESControl import IGESControl_Reader
@@ -46,6 +49,7 @@ from OCP.TopAbs import (
 from OCP.TopExp import TopExp_Explorer
 from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS, TopoDS_Compound, TopoDS_Iterator
+from OCP.TopTools import TopTools_FormatVersion
 
 SEWN = 1e-5  # of the box's diagonal: gaps between the faces of a model without solids that are sewn
 LEAST = 1e-6  # of its unit: its tolerance is a tenth of that, and smaller deflections are refused
@@ -194,18 +198,17 @@ def left_out(shape: Any, bodies: list[Any], kind: str) -> Counter[str]:
 def triangles(bodies: list[Any]) -> tuple[Arrays, list[tuple[int, float]]]:
     """Return arrays, and the faces without triangles with their areas.
 
-    vertices: (n, 3). faces: (m, 3), triangles. labels: (m, 2), the face and the body of each, counted from 1.
+    vertices: (n, 3). faces: (m, 3), triangles. labels: (m, 3), the face of each, its body, and its face among those of
+    the body, counted from 1.
     """
     points: list[tuple[float, float, float]] = []
     corners: list[tuple[int, ...]] = []
-    labels: list[tuple[int, int]] = []
+    labels: list[tuple[int, int, int]] = []
     missing: list[tuple[int, float]] = []
     number = 0
     for owner, body in enumerate(bodies, start=1):
-        explorer = TopExp_Explorer(body, TopAbs_FACE)
-        while explorer.More():
-            face, place, number = TopoDS.Face(explorer.Current()), TopLoc_Location(), number + 1
-            explorer.Next()
+        for own, shape in enumerate(parts(body, TopAbs_FACE).values(), start=1):
+            face, place, number = TopoDS.Face(shape), TopLoc_Location(), number + 1
             found = BRep_Tool.Triangulation_s(face, place)
             if found is None or not found.NbTriangles():
                 missing.append((number, area(face)))
@@ -217,11 +220,11 @@ def triangles(bodies: list[Any]) -> tuple[Arrays, list[tuple[int, float]]]:
             for k in range(1, found.NbTriangles() + 1):
                 row = tuple(first + corner for corner in found.Triangle(k).Get())
                 corners.append(row[::-1] if face.Orientation() == TopAbs_REVERSED else row)
-                labels.append((number, owner))
+                labels.append((number, owner, own))
     arrays = {
         "vertices": np.array(points, dtype=float).reshape(-1, 3),
         "faces": np.array(corners, dtype=int).reshape(-1, 3),
-        "labels": np.array(labels, dtype=int).reshape(-1, 2),
+        "labels": np.array(labels, dtype=int).reshape(-1, 3),
     }
     return arrays, missing
 
@@ -231,6 +234,15 @@ def area(face: Any) -> float:
     found = GProp_GProps()
     BRepGProp.SurfaceProperties_s(face, found)
     return float(found.Mass())
+
+
+def brep(shape: Any, factor: float) -> Any:
+    """Return the text of a shape in the BREP format of OpenCASCADE, in a unit of `factor` of its own: bytes (n,)."""
+    scale, text = gp_Trsf(), io.BytesIO()
+    scale.SetScale(gp_Pnt(), 1.0 / factor)
+    scaled = shape if factor == 1.0 else BRepBuilderAPI_Transform(shape, scale, True).Shape()
+    BRepTools.Write_s(scaled, text, False, False, TopTools_FormatVersion.TopTools_FormatVersion_VERSION_1)
+    return np.frombuffer(text.getvalue(), dtype=np.uint8)
 
 
 def read(path: str, kind: str, millimetres: float) -> tuple[Any, Counter[str]] | None:
@@ -250,8 +262,13 @@ def read(path: str, kind: str, millimetres: float) -> tuple[Any, Counter[str]] |
     return reader, lost
 
 
-def main(source: str, target: str, kind: str, millimetres: str, deflection: str, share: str, angle: str) -> None:
-    """Write the arrays of `triangles`, and `facts`, a text of JSON; nothing where the file cannot be read."""
+def main(
+    source: str, target: str, kind: str, millimetres: str, deflection: str, share: str, angle: str, factor: str
+) -> None:
+    """Write the arrays of `triangles`, `breps` and `facts`, a text of JSON; nothing where the file cannot be read.
+
+    breps: of the solids, the text of all together, brep0, and where there are several that of each, brep1, brep2, ...
+    """
     found = read(source, kind, float(millimetres))
     if found is None:
         return
@@ -278,7 +295,9 @@ def main(source: str, target: str, kind: str, millimetres: str, deflection: str,
         "missing": [number for number, found in areas if found > NO_AREA * size**2],
         "changed": kind == "step" and any(map(is_changed, placements(reader.StepModel()))),
     }
-    np.savez(target, facts=np.array(json.dumps(facts)), **arrays)
+    shapes = [compound(bodies), *(bodies if len(bodies) > 1 else [])] if what == "solid" else []
+    breps = {f"brep{k}": brep(shape, float(factor)) for k, shape in enumerate(shapes)}
+    np.savez(target, facts=np.array(json.dumps(facts)), **arrays, **breps)
 
 
 if __name__ == "__main__":
