@@ -53,15 +53,22 @@ class Assembled(NamedTuple):
     loads: OnPatches
     known: OnPatches
 
-    def shifted(self, factor: float) -> "Assembled":
-        """Return the same with `factor` times the mass in the matrix."""
-        laws = [law._replace(form=WithMass(law.form, factor), source=None) for law in self.matrix.laws]
+    def shifted(self, factors: Array) -> "Assembled":
+        """Return the same with the mass in the matrix, times the factor (n,) of each patch."""
+        each = zip(self.matrix.laws, factors.tolist(), strict=True)
+        laws = [
+            law._replace(form=WithMass(law.form, factor), source=None, same=(law.same, factor)) for law, factor in each
+        ]
         return self._replace(matrix=self.matrix.of(laws).with_faces([own.faces for own in self.matrix.parts]))
 
-    @property
-    def mass(self) -> BodyMatrix:
-        """Return the mass matrix of one component, by the same quadrature rules: that of others would be a source."""
-        return self.matrix.of([law._replace(form=Mass(), source=None, component=0) for law in self.matrix.laws])
+    def mass(self, factors: Array) -> BodyMatrix:
+        """Return the mass matrix of one component, times the factor (n,) of each patch.
+
+        It has the same quadrature rules: that of others would be a source.
+        """
+        each = zip(self.matrix.laws, factors.tolist(), strict=True)
+        laws = [law._replace(form=Mass(factor), source=None, component=0, same=factor) for law, factor in each]
+        return self.matrix.of(laws)
 
     def renewed(self, patches: Sequence[Stated]) -> "Assembled":
         """Return the same matrix with other data, which act on the same places."""

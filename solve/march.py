@@ -1,10 +1,11 @@
 """Marches through time with M u' + A u = f(t): BDF2 and the trapezoidal rule, step after step."""
 
+import itertools
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
-from numbers import Integral, Real
+from numbers import Integral
 from pathlib import Path
 from typing import Any, Literal
 
@@ -24,8 +25,9 @@ from .discretization.projection import projected
 from .discretization.unknowns import Unknowns, unknowns_of
 from .field import BodyField, FieldOnBody
 from .forms.boundary_value_problem import BoundaryValueProblem
-from .forms.data import Data, parse
+from .forms.data import PerPatch, parse_each
 from .forms.frame import UnitFrame
+from .forms.owners import Owner, demand_owners, demand_positive, of_each_patch
 from .linear.krylov import generalized_residuals
 from .options import SolveOptions
 from .patch_system import PatchProblem
@@ -78,12 +80,12 @@ class March(Brief):
 def march(
     body: BodyLike,
     problem: BoundaryValueProblem | Callable[[float], BoundaryValueProblem],
-    start: FieldOnBody | Data,
+    start: FieldOnBody | PerPatch,
     *,
     dt: float,
     steps: int,
     scheme: Literal["bdf2", "trapezoidal"] = "bdf2",
-    capacity: float = 1.0,
+    capacity: float | Mapping[Owner, float] = 1.0,
     first: float = 0.0,
     every: int = 1,
     callback: Callable[[float, BodyField], object] | None = None,
@@ -108,15 +110,15 @@ def march(
         law stays that of the first time, and so do the faces where u is given.
     start : SplineField, BodyField or datum
         u at the first time: a field of the trial space or of a coarser space, or a datum: a formula, a function or a
-        sequence.
+        sequence, also one for each solid.
     dt : float
         The time step.
     steps : int
         Number of time steps.
     scheme : str
         "bdf2" or "trapezoidal".
-    capacity : float
-        The factor of du/dt.
+    capacity : float, or dict of solid or patch to float
+        The factor of du/dt, of the whole body or for each of its solids, {"steel": 3.6, "pad": 1.9}.
     first : float
         The time of the start.
     every : int
@@ -146,7 +148,7 @@ def march(
     >>> bool(0.8 < found.fields[-1]([[0.5, 0.5, 0.5]])[0] < 1.0)  # later than the walls
     True
     """
-    _check(dt, steps, scheme, capacity, every)
+    _check(dt, steps, scheme, every)
     if callback is not None and not callable(callback):
         raise TypeError(f"callback must be a function of a time and a field, or None, got {callback!r:.80}")
     options = SolveOptions(
@@ -160,9 +162,10 @@ def march(
     at = problem if callable(problem) else lambda _: problem
     glued = as_body(body)
     placed, patches = prepared(glued, at(first), options)
+    rates = of_each_patch("capacity", capacity, glued.solids) / dt
     with one_blas_thread():
         data = _Data(glued, placed, patches, at, options, callable(problem))
-        path = _Path(data, scheme, capacity / dt, _started(data, start, first), first)
+        path = _Path(data, scheme, rates, _started(data, start, first), first)
         times, fields, iterations = [first], [path.field], []
         for number in range(1, steps + 1):
             iterations.append(path.step(first + number * dt))
@@ -174,11 +177,9 @@ def march(
     return March(np.array(times), tuple(fields), np.array(iterations))
 
 
-def _check(dt: float, steps: int, scheme: str, capacity: float, every: int) -> None:
+def _check(dt: float, steps: int, scheme: str, every: int) -> None:
     """Raise ValueError for arguments of `march` that are out of range."""
-    for name, value in (("dt", dt), ("capacity", capacity)):
-        if not (isinstance(value, Real) and 0.0 < value < np.inf):
-            raise ValueError(f"{name} must be a positive number, got {value!r:.80}")
+    demand_positive("dt", dt)
     for name, count in (("steps", steps), ("every", every)):
         if not (isinstance(count, Integral) and count >= 1):
             raise ValueError(f"{name} must be a whole number, at least 1, got {count!r:.80}")
@@ -231,13 +232,13 @@ class _Data:
         """Return all coefficients from the unknowns (c, ...) and the coefficients given on faces."""
         return known.layout.joined(self.unknowns.spread(free)) + known
 
-    def system(self, shift: float) -> System:
-        """Return the system of the law plus `shift` times the mass."""
-        first = self.first.shifted(shift)
+    def system(self, shifts: Array) -> System:
+        """Return the system of the law plus the mass, times the shift (n,) of each patch."""
+        first = self.first.shifted(shifts)
         return system_of(self.body, self.placed, self.patches, self.unknowns, first, is_loose=True)
 
 
-def _started(data: _Data, start: FieldOnBody | Data, time: float) -> OnPatches:
+def _started(data: _Data, start: FieldOnBody | PerPatch, time: float) -> OnPatches:
     """Return the coefficients of the start; those on faces follow from the data at `time`.
 
     A datum is projected on each patch: at an interface the mean of the patches' coefficients is taken.
@@ -245,9 +246,11 @@ def _started(data: _Data, start: FieldOnBody | Data, time: float) -> OnPatches:
     if isinstance(start, FieldOnBody):
         full = coefficients_in(start, data.patches)
     else:
-        datum = parse("start", start, data.placed.form.components, of_coordinates=data.placed.of_coordinates)
-        placed = datum.placed(UnitFrame.of(data.body))
-        own = [placed] if data.body.is_single else map(placed.on_patch, range(len(data.body)))
+        datum = parse_each("start", start, data.placed.form.components, of_coordinates=data.placed.of_coordinates)
+        placed, solids = datum.placed(UnitFrame.of(data.body)), data.body.solids
+        if isinstance(start, Mapping):
+            demand_owners("start", start.keys(), solids)
+        own = itertools.starmap(placed.on_patch, enumerate(solids.of_patches))
         parts = zip(data.patches, own, strict=True)
         full = [projected(patch.volume, patch.space, values) for patch, values in parts]
     copies = data.unknowns.collect([np.ones(part.shape) for part in full])
@@ -257,13 +260,14 @@ def _started(data: _Data, start: FieldOnBody | Data, time: float) -> OnPatches:
 class _Path:
     """Hold the state of a march: the time, and the last and earlier coefficients of all patches."""
 
-    def __init__(self, data: _Data, scheme: str, rate: float, start: OnPatches, time: float) -> None:
-        """Begin a march at a time; rate: the capacity over dt."""
-        self.data, self.scheme, self.rate = data, scheme, rate
+    def __init__(self, data: _Data, scheme: str, rates: Array, start: OnPatches, time: float) -> None:
+        """Begin a march at a time; rates: (n,), the capacity over dt of each patch."""
+        self.data, self.scheme = data, scheme
         self.time, self.last, self.load = time, start, data.at(time).loads
         self.before: OnPatches | None = None
-        self.system = data.system(FACTORS[scheme] * rate)
-        self.mass = data.first.mass
+        self.rate = float(rates.max())
+        self.system = data.system(FACTORS[scheme] * rates)
+        self.mass = data.first.mass(rates / self.rate)
 
     @property
     def field(self) -> BodyField:

@@ -2,6 +2,7 @@
 
 import logging
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from numbers import Integral, Real
 from pathlib import Path
@@ -18,6 +19,7 @@ from parameterize.threads import one_blas_thread
 from .diagnostics import TOO_STIFF, ConvergenceError, bending_notices
 from .field import BodyField
 from .forms.boundary_value_problem import BoundaryValueProblem
+from .forms.owners import Owner, demand_positive, of_each_patch
 from .linear.direct import factorized, price_of, sparse
 from .linear.inverse import RoughInverse
 from .lowest import Lowest, Pencil, Product, by_columns, of_unit_mass
@@ -97,7 +99,7 @@ class Modes(Brief):
 def modes(
     body: BodyLike,
     law: BoundaryValueProblem,
-    density: float = 1.0,
+    density: float | Mapping[Owner, float] = 1.0,
     n: int = 6,
     *,
     refine: int = 0,
@@ -118,8 +120,8 @@ def modes(
         The body.
     law : Elasticity, Poisson or Problem
         A symmetric law; only the data of held faces, and Robin's alpha, have an effect.
-    density : float
-        Mass per volume.
+    density : float, or dict of solid or patch to float
+        Mass per volume, of the whole body or for each of its solids, {"steel": 7850.0, "pad": 1100.0}.
     n : int
         Number of modes.
     refine, degree, threads, quadrature
@@ -157,7 +159,9 @@ def modes(
         raise ValueError(f"{type(law.form).__name__} is not symmetric: its modes need not be real, and are not sought")
     options = SolveOptions(refine=refine, degree=degree, threads=threads, quadrature=quadrature)
     system = discretized(body, law, options, is_loose=True).at_rest()
-    mass = by_columns(system.mass.matvec)
+    densities = of_each_patch("density", density, system.body.solids)
+    largest = float(densities.max())  # the iteration sees densities near 1, in any units
+    mass = by_columns(system.weighted_mass(densities / largest).matvec)
     motions = rigid_motions(system)
     rigid = motions.shape[1]
     if n + rigid > len(system.load):
@@ -177,15 +181,16 @@ def modes(
         notices = (*notices, f"loads do not matter to vibrations: {', '.join(law.loads)}")
     for notice in notices:
         log.warning("%s", notice)
-    omega = np.sqrt(found.values / density)
-    shapes = tuple(system.field(_upright(x) / math.sqrt(density)) for x in found.vectors.T)
+    omega = np.sqrt(found.values / largest)
+    shapes = tuple(system.field(_upright(x) / math.sqrt(largest)) for x in found.vectors.T)
     return Modes(omega / (2.0 * math.pi), shapes, found.residuals, found.iterations, rigid, notices)
 
 
-def check_modes(density: float, n: int, tolerance: float = 0.5, max_iterations: int = 1) -> None:
+def check_modes(
+    density: float | Mapping[Owner, float], n: int, tolerance: float = 0.5, max_iterations: int = 1
+) -> None:
     """Raise ValueError for arguments of `modes` that are out of range."""
-    if not (isinstance(density, Real) and 0.0 < density < math.inf):
-        raise ValueError(f"density must be a positive number, got {density!r:.80}")
+    demand_positive("density", density)
     for name, count in (("number of modes n", n), ("max_iterations", max_iterations)):
         if not (isinstance(count, Integral) and count >= 1):
             raise ValueError(f"{name} must be a whole number, at least 1, got {count!r:.80}")

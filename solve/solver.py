@@ -178,7 +178,7 @@ def _on_patches(
     """Return the problem placed in the body, and the problem on each patch."""
     if not isinstance(problem, BoundaryValueProblem):
         raise TypeError(f"problem must be a Poisson, an Elasticity or a Problem, got {type(problem).__name__}")
-    _demand_known_patches(body, problem)
+    _demand_known_faces(body, problem)
     placed, patches = problem.on(body), []
     for i, (volume, own) in enumerate(zip(body, placed.on_patches(body), strict=True)):
         space = trial_space(volume, options.refine, options.degree, own.dirichlet, body.outer[i])
@@ -186,15 +186,12 @@ def _on_patches(
     return placed, patches
 
 
-def _demand_known_patches(body: Body, problem: BoundaryValueProblem) -> None:
-    """Raise ValueError for data of faces that are not outer faces of the body, and of patches that it does not have."""
+def _demand_known_faces(body: Body, problem: BoundaryValueProblem) -> None:
+    """Raise ValueError for data of faces that are not outer faces of the body."""
     outer = {body.face_name(*face) for face in body.outer_faces}
     if unknown := sorted(problem.patch_faces - outer):
         faces = "u0 to w1" if body.is_single else listed(sorted(outer), 12)
         raise ValueError(f"{unknown[0]} is no outer face of the body; its faces are {faces}")
-    for name, numbers in problem.by_patch.items() if not body.is_single else ():
-        if beyond := sorted(numbers - set(range(len(body))), key=str):
-            raise ValueError(f"{name}: there is no patch {beyond[0]!r}; the body has {len(body)}, from 0 on")
 
 
 def check_problem(body: BodyLike, problem: BoundaryValueProblem, comm: Any = None) -> None:

@@ -115,12 +115,16 @@ class System:
     @functools.cached_property
     def mass(self) -> LinearOperator:
         """Return the mass matrix, the integrals of u . v."""
+        return self.weighted_mass(np.ones(len(self.matrix.laws)))
+
+    def weighted_mass(self, densities: Array) -> LinearOperator:
+        """Return the integrals of density u . v, with the density (n,) of each patch."""
         rules: dict[int, GaussRule] = {}
         laws = []
-        for law in self.matrix.laws:
+        for law, density in zip(self.matrix.laws, densities.tolist(), strict=True):
             if id(law.rule) not in rules:
                 rules[id(law.rule)] = operator_rule(law.space, "spline")
-            laws.append(Law(law.volume, law.space, rules[id(law.rule)], Mass()))
+            laws.append(Law(law.volume, law.space, rules[id(law.rule)], Mass(density), same=density))
         whole, _ = assemble_body(self.matrix.layout, laws, self.matrix.parts[0].threads)
         return self._linear(lambda x: self._product(x, whole))
 

@@ -191,9 +191,12 @@ def test_a_coarser_solution_is_a_start():
         iga_nn.solve(body, law, refine=1, start=iga_nn.solve(two(), law))
 
 
-def test_options_that_take_one_patch_say_so():
-    with pytest.raises(ValueError, match="kappa is given by patch"):
+def test_data_by_patch_of_a_volume_are_those_of_its_only_patch():
+    with pytest.raises(ValueError, match="kappa: there is no patch 1; the body has 1"):
         iga_nn.solve(box((0, 0, 0)), iga_nn.Poisson(source="1", boundary="0", kappa={0: 1.0, 1: 2.0}))
+    given, alone = (iga_nn.Elasticity(young=young, fix="u0", load={"u1": (1, 0, 0)}) for young in ({0: 2.0}, 2.0))
+    found, expected = (iga_nn.solve(box((0, 0, 0)), law).patches[0].coefficients for law in (given, alone))
+    assert np.array_equal(found, expected)
 
 
 def test_a_part_that_nothing_holds_is_named():

@@ -141,13 +141,37 @@ def test_the_material_of_a_body_may_differ_by_patch(in_folder, capsys):
     assert "young has no entry for patch 1" in capsys.readouterr().err
 
 
+def test_the_material_of_a_body_may_differ_by_solid(in_folder, capsys):
+    """The same rod, whose second patch is a solid with a name of its own."""
+    iga_nn.Body(rod().patches, rod().interfaces, ("steel", "rubber pad")).save("rod.npz")
+    held = ["rod.npz", "--fix", "p0_u0=0;;", "--fix", "v0=;0;", "--fix", "w0=;;0", "--load", "p1_u1=1;0;0"]
+    given = ["solve", "elasticity", *held, "--poisson-ratio", "0", "--refine", "0", "--out", "out"]
+    assert main([*given, "--young", "steel: 1, rubber pad: 4"]) == 0
+    field = BodyField.load("out/solution.npz")
+    assert field.patches[1]([[1.0, 0.5, 0.5]])[0, 0] == pytest.approx(1.25, abs=1e-6)
+    assert "E = steel: 1, rubber pad: 4" in (in_folder / "out" / "report.html").read_text()
+    assert main([*given, "--force", "--young", "steel: 1, pad: 4"]) == 2
+    assert "young: there is no solid 'pad'; the body has steel, rubber pad" in capsys.readouterr().err
+    assert main(["solve", "poisson", "rod.npz", "--source", "1", "--boundary", "0", "--kappa", "steel: 1"]) == 2
+    assert "kappa has no entry for solid 'rubber pad'" in capsys.readouterr().err
+    assert main(["modes", "rod.npz", "--density", "steel: 1, rubber pad: 4", "--number", "1", "--out", "modes"]) == 0
+    assert main(["modes", "rod.npz", "--density", "steel: 1", "--out", "x"]) == 2
+    assert "density has no entry for solid 'rubber pad'" in capsys.readouterr().err
+
+
 def test_texts_by_patch():
     assert texts.by_patch("--kappa", "1,0,0,1,0,1", str) == "1,0,0,1,0,1"
     assert texts.by_patch("--kappa", " p0: 1,2 , p12:x+y", str) == {0: "1,2", 12: "x+y"}
-    for text in ("p0: 1, p0: 2", "1, p1: 2"):
-        with pytest.raises(iga_nn.InputError, match="write one entry a patch"):
+    several = "steel: 1,0,0,1,0,1, a rubber pad:x+y, 'bolt, M6: long': 2"
+    assert texts.by_patch("--kappa", several, str) == {
+        "steel": "1,0,0,1,0,1",
+        "a rubber pad": "x+y",
+        "bolt, M6: long": "2",
+    }
+    for text in ("p0: 1, p0: 2", "1, p1: 2", "steel: 1, steel: 2", "steel: 1, p1: 2"):
+        with pytest.raises(iga_nn.InputError, match="write one entry a solid"):
             texts.by_patch("--kappa", text, str)
-    with pytest.raises(iga_nn.InputError, match="give a number, or one a patch"):
+    with pytest.raises(iga_nn.InputError, match="give a number, or one a solid"):
         iga_nn.ElasticityOptions(young="soft", body_force="0;0;1").problem()
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from ..errors import InputError, input_errors
 from ..type_check import Checked
@@ -41,9 +41,10 @@ class ModesOptions(Checked):
     """Hold the options of the vibrations of an elastic body: its material, its supports and the number of modes.
 
     Attributes:
-        young: Young's modulus E; of several patches also one for each: "p0: 210, p1: 70".
+        young: Young's modulus E; of several solids also one for each by its name, "steel: 210000, pad: 8", and of
+            several patches "p0: 210, p1: 70".
         poisson_ratio: Poisson's ratio nu, as young.
-        density: mass per volume, in units that agree with those of E and of the volume.
+        density: mass per volume, in units that agree with those of E and of the volume, as young.
         number: number of modes, from the lowest frequency on.
         fix: regions of the boundary that are held, as in `run elasticity`: "nz < -0.9", "face(x, y, z)", group:NAME,
             u0; without any the body is free, and its rigid motions are left out.
@@ -55,13 +56,18 @@ class ModesOptions(Checked):
 
     young: float | str = 1.0
     poisson_ratio: float | str = 0.3
-    density: float = 1.0
+    density: float | str = 1.0
     number: int = 6
     fix: tuple[str, ...] = ()
     roller: tuple[str, ...] = ()
     refine: int = 0
     degree: int | None = None
     solve_anyway: bool = False
+
+    @property
+    def densities(self) -> Any:
+        """Return the density, or that of each patch or solid. Raises InputError."""
+        return modulus("--density", self.density)
 
     def problem(self) -> Elasticity:
         """Return the body, without loads. Raises InputError."""
@@ -72,7 +78,7 @@ class ModesOptions(Checked):
         check_space([self.refine], self.degree)
         free = {} if self.fix or self.roller else dict.fromkeys(FACE_NAMES, ["0"] * 3)
         with input_errors():
-            check_modes(self.density, self.number)
+            check_modes(self.densities, self.number)
             young, ratio = modulus("--young", self.young), modulus("--poisson-ratio", self.poisson_ratio)
             return Elasticity(
                 traction=free, young=young, poisson_ratio=ratio, fix=self.fix or None, roller=self.roller or None

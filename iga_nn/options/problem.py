@@ -149,11 +149,12 @@ class PoissonOptions(ProblemOptions):
     Attributes:
         exact: exact solution, a formula, from which f and g follow; errors are reported. It is exp(X+Z)*sin(Y) where
             neither f nor g is given. A formula that starts with a minus is written --exact=-x.
-        source: f, a formula; of several patches also one for each, as kappa.
+        source: f, a formula; of several solids also one for each, as kappa.
         boundary: g, the values of u, a formula.
-        kappa: one formula, or six separated by commas for a symmetric tensor: xx,xy,xz,yy,yz,zz; of several patches
-            also an entry for each: "p0: 1, p1: 2+x".
-        reaction: c, a formula; of several patches also one for each, as kappa.
+        kappa: one formula, or six separated by commas for a symmetric tensor: xx,xy,xz,yy,yz,zz; of several solids also
+            an entry for each by its name, "steel: 50, pad: 0.2+x", and of several patches "p0: 1, p1: 2+x". The second
+            solid is solid2 if it has no name; a name with a comma or a colon stands in quotes.
+        reaction: c, a formula; of several solids also one for each, as kappa.
         neumann: faces with a given flux kappa du/dn, each as FACE=FORMULA, or FACE for the flux of the exact solution.
         robin: faces where kappa du/dn + alpha u = g, each as FACE=ALPHA:FORMULA, or FACE=ALPHA for the g of the exact
             solution.
@@ -249,11 +250,13 @@ class ElasticityOptions(ProblemOptions):
     Attributes:
         exact: exact displacement, a vector, from which force and boundary data follow; errors are reported. A vector
             that starts with a minus is written --exact="-x;0;0".
-        body_force: force per volume, a vector; zero where neither it nor exact is given.
+        body_force: force per volume, a vector; zero where neither it nor exact is given; also one for each solid.
         displacement: displacement on the faces without traction, a vector; zero where neither it nor exact is given.
         traction: faces where a traction is given, each as "FACE=VECTOR", FACE=0 for a face that is free, or FACE for
             the traction of the exact solution.
-        young: Young's modulus E; of several patches also one for each: "p0: 210, p1: 70".
+        young: Young's modulus E; of several solids also one for each by its name, "steel: 210000, pad: 8", and of
+            several patches "p0: 210, p1: 70". The second solid is solid2 if it has no name; a name with a comma or a
+            colon stands in quotes.
         poisson_ratio: Poisson's ratio nu, as young.
         formulation: "mixed" solves for displacement and pressure, as bodies that hardly change their volume need,
             "displacement" for the displacement alone; by default mixed where Poisson's ratio exceeds 0.45.
@@ -355,7 +358,7 @@ class ElasticityOptions(ProblemOptions):
         with input_errors():
             return Elasticity(
                 exact=texts.vector("--exact", self.exact),
-                body_force=texts.vector("--body-force", self.body_force),
+                body_force=_by_patch("--body-force", self.body_force, partial(texts.vector, "--body-force")),
                 displacement=texts.vector("--displacement", self.displacement),
                 traction={face: texts.vector(f"--traction {face}", text) for face, text in traction.items()},
                 young=modulus("--young", self.young),
@@ -365,7 +368,7 @@ class ElasticityOptions(ProblemOptions):
 
 
 def modulus(flag: str, given: float | str) -> Any:
-    """Return a number of a material, or the numbers of each patch. Raises InputError."""
+    """Return a number of a material, or the numbers of each patch or solid. Raises InputError."""
     return given if not isinstance(given, str) else texts.by_patch(flag, given, partial(texts.number, flag))
 
 

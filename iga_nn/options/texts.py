@@ -12,7 +12,8 @@ if TYPE_CHECKING:
     from solve.forms.conditions import Condition
 
 _EQUALS = re.compile("(?<![<>=])=(?!=)")
-_PATCH = re.compile(r"(?:^|,)\s*p(\d+)\s*:")
+_OWNER = re.compile(r"""(?:^|,)\s*("[^"]*"|'[^']*'|[^,:"']*[^,:"'\s])\s*:""")
+_PATCH = re.compile(r"p(\d+)")
 _QUOTED = re.compile("\"[^\"]*\"|'[^']*'")
 
 
@@ -77,17 +78,20 @@ def vector(flag: str, text: str | None) -> list[str] | None:
 
 
 def by_patch(flag: str, text: str, read: Callable[[str], Any]) -> Any:
-    """Return what `read` makes of a text, or, of a text such as "p0: 1, p1: 2+x", of each patch's own by its number.
+    """Return what `read` makes of a text, or of each patch's or solid's own entry, by its number or name.
 
-    Raises InputError for a patch with two entries, and for text before the first patch.
+    Texts by patch are such as "p0: 1, p1: 2+x", by solid such as "steel: 210000, pad: 8"; a name with a comma, a colon
+    or a quotation mark stands in quotes. Raises InputError for an owner with two entries, for patches beside solids,
+    and for text before the first owner.
     """
-    before, *rest = _PATCH.split(text)
+    before, *rest = _OWNER.split(text)
     if not rest:
         return read(text)
-    numbers, own = list(map(int, rest[::2])), rest[1::2]
-    if before.strip() or len(set(numbers)) < len(numbers):
-        raise InputError(f"{flag} {text!r:.80}: write one entry a patch, such as 'p0: 1, p1: 2'")
-    return {number: read(entry.strip()) for number, entry in zip(numbers, own, strict=True)}
+    owners = [int(patch[1]) if (patch := _PATCH.fullmatch(name)) else name.strip("\"'") for name in rest[::2]]
+    if before.strip() or len(set(owners)) < len(owners) or len(set(map(type, owners))) > 1:
+        forms = "'steel: 1, pad: 2', or a patch, 'p0: 1, p1: 2'"
+        raise InputError(f"{flag} {text!r:.80}: write one entry a solid, {forms}")
+    return {owner: read(entry.strip()) for owner, entry in zip(owners, rest[1::2], strict=True)}
 
 
 def number(flag: str, text: str) -> float:
@@ -95,4 +99,4 @@ def number(flag: str, text: str) -> float:
     try:
         return float(text)
     except ValueError:
-        raise InputError(f"{flag} {text!r:.80}: give a number, or one a patch, such as 'p0: 1, p1: 2'") from None
+        raise InputError(f"{flag} {text!r:.80}: give a number, or one a solid, such as 'steel: 1, pad: 2'") from None

@@ -377,7 +377,7 @@ def modes_to(
             found = modes(
                 loaded,
                 body,
-                modes_options.density,
+                modes_options.densities,
                 modes_options.number,
                 refine=modes_options.refine,
                 degree=modes_options.degree,

@@ -19,6 +19,7 @@ from .data import ByPatch, Data, Datum, PerPatch, finite, parse_each
 from .form import Form, check_shapes, strong_form, strong_terms
 from .frame import UnitFrame
 from .jets import Jet, Numbers, coordinates, known
+from .owners import Owner, demand_owners
 from .parser import Expression
 from .region import Part
 
@@ -162,9 +163,9 @@ class BoundaryValueProblem:
         return {name for condition in self._all for name in condition.region.patch_faces}
 
     @property
-    def by_patch(self) -> dict[str, set[int]]:
-        """Return the numbers of the patches for which data are given one by one, by the name of the datum."""
-        return {datum.name: set(datum.patches) for _, datum in self._datums if isinstance(datum, ByPatch)}
+    def by_patch(self) -> dict[str, Collection[Owner]]:
+        """Return the patches or solids for which data are given one by one, by the name of the datum."""
+        return {datum.name: datum.patches.keys() for _, datum in self._datums if isinstance(datum, ByPatch)}
 
     @property
     def in_volume(self) -> Hashable:
@@ -191,10 +192,27 @@ class BoundaryValueProblem:
         return [(condition.kind, condition.region.text) for condition in self._all]
 
     def on_patches(self, body: Body) -> list[Self]:
-        """Return the problem of each patch of a body; of a single patch the problem itself."""
-        return [self] if body.is_single else [self.on_patch(i, faces) for i, faces in enumerate(body.outer)]
+        """Return the problem of each patch of a body; of a single patch the problem itself.
 
-    def on_patch(self, patch: int, outer: Collection[str]) -> Self:
+        Raises ValueError for data given by patch or by solid that are not those of the body.
+        """
+        for name, owners in self.by_patch.items():
+            demand_owners(name, owners, body.solids)
+        solids = body.solids.of_patches
+        if body.is_single:
+            return [self.of_patch(0, solids[0]) if self.by_patch else self]
+        each = enumerate(zip(solids, body.outer, strict=True))
+        return [self.on_patch(patch, outer, solid) for patch, (solid, outer) in each]
+
+    def of_patch(self, patch: int, solid: str = "") -> Self:
+        """Return the problem with the data of a patch and its solid."""
+        return copy(self)._assign(
+            data={role: datum.on_patch(patch, solid) for role, datum in self.data.items()},
+            faces=tuple(one.on_patch(patch, solid) for one in self.faces),
+            conditions=tuple(one.on_patch(patch, solid) for one in self.conditions),
+        )
+
+    def on_patch(self, patch: int, outer: Collection[str], solid: str = "") -> Self:
         """Return the problem of one patch of several, with data on the patch's outer faces alone.
 
         Data of "p2_u0" belong to a face of patch 2, data of "u0" to this face of every patch that has no own data.
@@ -202,12 +220,8 @@ class BoundaryValueProblem:
         prefix = f"p{patch}_"
         own = {face: self._of(prefix + face) or self._of(face) for face in outer}
         won = [(one, [face for face in outer if own[face] is one]) for one in self.faces]
-        other = copy(self)._assign(
-            prefix=prefix,
-            data={role: datum.on_patch(patch) for role, datum in self.data.items()},
-            faces=tuple(one.on_patch(patch, names) for one, names in won if names),
-            conditions=tuple(one.on_patch(patch) for one in self.conditions),
-        )
+        faces = tuple(one.on_patch(patch, solid, names) for one, names in won if names)
+        other = self.of_patch(patch, solid)._assign(prefix=prefix, faces=faces)
         return other._assign(dirichlet=tuple(filter(other.strong_on, outer)))
 
     def _of(self, face: str) -> Condition | None:

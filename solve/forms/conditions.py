@@ -155,9 +155,9 @@ class Condition:
         parsed = self.parsed if frame is None else {name: datum.placed(frame) for name, datum in self.parsed.items()}
         return self._with(region=self.region.placed(frame, surface), parsed=parsed)
 
-    def on_patch(self, patch: int, faces: Sequence[str] | None = None) -> Self:
-        """Return the condition of one patch of several. faces: those of the patch that it has; by default its own."""
-        parsed = {name: datum.on_patch(patch) for name, datum in self.parsed.items()}
+    def on_patch(self, patch: int, solid: str = "", faces: Sequence[str] | None = None) -> Self:
+        """Return the condition of one patch of a solid. faces: those of the patch that it has; by default its own."""
+        parsed = {name: datum.on_patch(patch, solid) for name, datum in self.parsed.items()}
         return self._with(parsed=parsed, faces=self.faces if faces is None else tuple(faces))
 
     def flux_at(self, exact: Exact, x: Array, normal: Array) -> Array:

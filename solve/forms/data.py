@@ -12,6 +12,7 @@ from parameterize.arrays import Array
 
 from ..field import FieldOnBody
 from .frame import UnitFrame
+from .owners import Owner, entry_of
 from .parser import Expression, ExpressionError
 
 LARGEST = 1e100  # of data: their squares, summed over all points, must not overflow
@@ -22,7 +23,7 @@ USUAL_SIZE = 5.0  # of coordinates in which formulas are written
 
 Scalar = str | float | FieldOnBody | Callable[..., ArrayLike]
 Data = Scalar | Sequence[Scalar]  # a sequence has one entry a component
-PerPatch = Data | Mapping[int, Data]  # a datum of the body, or one of each patch
+PerPatch = Data | Mapping[Owner, Data]  # a datum of the body, or one of each patch or solid
 Entry = Expression | FieldOnBody | Callable[[Array], ArrayLike]
 
 
@@ -59,8 +60,8 @@ class Datum:
         """Return the same datum with X, Y, Z measured in a frame."""
         return replace(self, entries=tuple(e.placed(frame) if isinstance(e, Expression) else e for e in self.entries))
 
-    def on_patch(self, patch: int) -> "Datum":
-        """Return the datum on one patch of several, where fields are those of the patch."""
+    def on_patch(self, patch: int, solid: str = "") -> "Datum":
+        """Return the datum on one patch of several, which belongs to a solid; fields are those of the patch."""
         own = (entry.patches[patch] if isinstance(entry, FieldOnBody) else entry for entry in self.entries)
         return replace(self, entries=tuple(own))
 
@@ -98,13 +99,13 @@ class Datum:
 
 @dataclass(frozen=True)
 class ByPatch(Datum):
-    """Hold a datum that is another one on each patch, such as the material; `entries` are those of all patches."""
+    """Hold a datum that is another one on each patch or solid, such as the material; `entries` are those of all."""
 
-    patches: Mapping[int, Datum] = field(default_factory=dict)
+    patches: Mapping[Owner, Datum] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, name: str, patches: Mapping[int, Datum], face: str = "") -> "ByPatch":
-        """Return the datum from the data of the patches."""
+    def of(cls, name: str, patches: Mapping[Owner, Datum], face: str = "") -> "ByPatch":
+        """Return the datum from the data of the patches or solids."""
         return cls(name, tuple(entry for datum in patches.values() for entry in datum.entries), 1, face, patches)
 
     def placed(self, frame: UnitFrame) -> "ByPatch":
@@ -112,15 +113,14 @@ class ByPatch(Datum):
         placed = {patch: datum.placed(frame) for patch, datum in self.patches.items()}
         return self.of(self.name, placed, self.face)
 
-    def on_patch(self, patch: int) -> Datum:
-        """Return the datum of a patch. Raises ValueError for a patch without one."""
-        if patch not in self.patches:
-            raise ValueError(f"{self.name} has no entry for patch {patch}: give one a patch")
-        return self.patches[patch].on_patch(patch)
+    def on_patch(self, patch: int, solid: str = "") -> Datum:
+        """Return the datum of a patch, or of its solid."""
+        own: Datum = entry_of(self.patches, patch, solid)
+        return own.on_patch(patch)
 
     def __call__(self, x: Array) -> Array:
         """Raise ValueError: points alone do not say on which patch they lie."""
-        raise ValueError(f"{self.name} is given by patch, which needs a body of several patches")
+        raise ValueError(f"{self.name} is given by patch or by solid, which needs a body")
 
 
 def parse(name: str, data: Data, components: int = 1, face: str = "", *, of_coordinates: bool = False) -> Datum:
@@ -163,18 +163,21 @@ def parse_each(
     of_coordinates: bool = False,
     counts_own: bool = False,
 ) -> Datum:
-    """Return a user's datum as `parse` does, or data given as a dictionary of patches as one datum.
+    """Return a user's datum as `parse` does, or data given as a dictionary of patches or of solids as one datum.
 
     counts_own: whether the number of entries may differ from patch to patch: kappa is a number here, a tensor there.
     """
     if not isinstance(data, Mapping):
         return parse(name, data, components, face, of_coordinates=of_coordinates)
-    if wrong := [key for key in data if not isinstance(key, int) or key < 0]:
-        raise ValueError(f"{name}: {wrong[0]!r} is no number of a patch, as in {{0: ..., 1: ...}}")
+    if wrong := [key for key in data if not isinstance(key, str) and not (isinstance(key, int) and key >= 0)]:
+        raise ValueError(
+            f"{name}: {wrong[0]!r} is neither the number of a patch, as in {{0: ..., 1: ...}}, nor the name of a solid"
+        )
     each = {}
-    for patch, own in data.items():
+    for owner, own in data.items():
         count = len(own) if counts_own and isinstance(own, list) else components
-        each[patch] = parse(f"{name} of p{patch}", own, count, face, of_coordinates=of_coordinates)
+        whose = owner if isinstance(owner, str) else f"p{owner}"
+        each[owner] = parse(f"{name} of {whose}", own, count, face, of_coordinates=of_coordinates)
     return ByPatch.of(name, each, face)
 
 

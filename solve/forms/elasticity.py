@@ -15,6 +15,7 @@ from parameterize.arrays import Array
 from .conditions import OF_BODIES, Condition, GivenRegions, OnFaces
 from .data import LARGEST, SMALLEST, Data
 from .form import Quantity
+from .owners import Owner, entry_of
 from .problem import LawWithData
 
 NONE = ("0", "0", "0")  # of a vector
@@ -44,9 +45,9 @@ class Elasticity(LawWithData):
         sigma n, n the outward unit normal; None: from `exact`. A solve leaves one face at least to displacement;
         `iga_nn.modes` takes a free body, too.
     young : float
-        E > 0. On several patches also a dictionary, a number a patch.
+        E > 0. On several patches or solids also a dictionary: a number for each patch, or for the name of each solid.
     poisson_ratio : float
-        -1 < nu < 1/2. `lame` converts from lambda and mu. On several patches also a dictionary, a number a patch.
+        -1 < nu < 1/2, or a dictionary as `young`. `lame` converts from lambda and mu.
     conditions : sequence of Fix, Roller, Symmetry, Load, Pressure or Spring, optional
         Supports and loads on regions of the boundary. Where a region is given, the rest of the boundary is free, or has
         the traction of `exact`; `displacement` and `traction` are left out then.
@@ -75,8 +76,8 @@ class Elasticity(LawWithData):
     body_force: Data | None = None
     displacement: Data | None = None
     traction: OnFaces = field(default_factory=dict)
-    young: float | Mapping[int, float] = 1.0
-    poisson_ratio: float | Mapping[int, float] = 0.3
+    young: float | Mapping[Owner, float] = 1.0
+    poisson_ratio: float | Mapping[Owner, float] = 0.3
     _: KW_ONLY
     conditions: Sequence[Condition] = ()  # type: ignore[assignment]  # a tuple once the problem is made
     fix: GivenRegions | None = None
@@ -123,26 +124,20 @@ class Elasticity(LawWithData):
 
     @property
     def constants(self) -> tuple[float, float]:
-        """Return Lame's constants lambda and mu; where they are given by patch, those of the first patch."""
+        """Return Lame's constants lambda and mu; where they are given by patch or solid, those of the first."""
         young, nu = _values(self.young)[0], _values(self.poisson_ratio)[0]
         return young * nu / ((1.0 + nu) * (1.0 - 2.0 * nu)), young / (2.0 * (1.0 + nu))
 
     @property
-    def by_patch(self) -> dict[str, set[int]]:
-        """Return the numbers of the patches for which data are given one by one, by the name of the datum."""
+    def by_patch(self) -> dict[str, Collection[Owner]]:
+        """Return the patches or solids for which data are given one by one, by the name of the datum."""
         given = {name: getattr(self, name) for name in ("young", "poisson_ratio")}
-        return super().by_patch | {name: set(own) for name, own in given.items() if isinstance(own, Mapping)}
+        return super().by_patch | {name: own.keys() for name, own in given.items() if isinstance(own, Mapping)}
 
-    def on_patch(self, patch: int, outer: Collection[str]) -> Self:
-        """Return the problem of one patch of several, with the material of the patch."""
-        other = super().on_patch(patch, outer)
-        for name in ("young", "poisson_ratio"):
-            given = getattr(self, name)
-            if isinstance(given, Mapping):
-                if patch not in given:
-                    raise ValueError(f"{name} has no entry for patch {patch}: give one a patch")
-                object.__setattr__(other, name, given[patch])
-        return other
+    def of_patch(self, patch: int, solid: str = "") -> Self:
+        """Return the problem with the data and the material of a patch and its solid."""
+        own = {name: entry_of(getattr(self, name), patch, solid) for name in ("young", "poisson_ratio")}
+        return super().of_patch(patch, solid)._assign(**own)
 
     @property
     def in_volume(self) -> Hashable:
@@ -208,8 +203,8 @@ class Elasticity(LawWithData):
         return found
 
 
-def _values(material: float | Mapping[int, float]) -> list[float]:
-    """Return a number of the material as a list, or the numbers of the patches."""
+def _values(material: float | Mapping[Owner, float]) -> list[float]:
+    """Return a number of the material as a list, or the numbers of the patches or solids."""
     return list(material.values()) if isinstance(material, Mapping) else [material]
 
 

@@ -10,15 +10,18 @@ from .form import Form, reaction
 
 
 class Mass(Form):
-    """Define the law of the mass matrix: int u . v."""
+    """Define the law of the mass matrix: int factor u . v."""
+
+    def __init__(self, factor: float = 1.0) -> None:
+        self.factor = factor
 
     def tensor(self, x: Array, component: int = 0) -> Array:
         """Return zero (6, ...), because there is no flux."""
         return np.zeros((6, *x.shape[1:]))
 
     def react(self, u: Any, grad: Any, x: Any) -> Any:
-        """Return u."""
-        return u
+        """Return `factor` times u."""
+        return self.factor * u
 
 
 class WithMass(Form):

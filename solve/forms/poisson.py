@@ -40,9 +40,10 @@ class Poisson(LawWithData):
         Values of u on the faces that are in neither `neumann` nor `robin`; default: `exact`, or zero.
     kappa : one, six or nine entries, or three rows of three, optional
         A scalar; or a symmetric tensor as six entries xx, xy, xz, yy, yz, zz, as nine by rows, or as three rows: lists
-        or a 3 x 3 array; default 1. Positive definite. On several patches also a dictionary, an entry a patch.
+        or a 3 x 3 array; default 1. Positive definite. On several patches or solids also a dictionary:
+        an entry for each patch, {0: ..., 1: ...}, or for each solid, {"steel": ..., "pad": ...}.
     reaction : entry, optional
-        c, not negative; default 0. On several patches also a dictionary, an entry a patch.
+        c, not negative; default 0. Also a dictionary, as `kappa`.
     neumann : dict of face name to entry or None
         kappa grad u . n on the faces "u0", "u1", "v0", "v1", "w0", "w1", n the outward unit normal; None: from `exact`.
     robin : dict of face name to (entry, entry or None)
