@@ -273,6 +273,8 @@ def given_corners(surface: Surface, corners: ArrayLike | None, config: Config) -
     """
     if corners is None:
         return None
+    if not surface.is_plain:
+        raise ValueError("corners are those of one cube, and this body has cavities or several solids: leave them out")
     if surface.genus or (config.blocks or 1) > 1:
         why = f"this body has handles (genus {surface.genus})" if surface.genus else "several blocks are asked for"
         raise ValueError(f"corners are those of one cube, and {why}: leave them out")

@@ -177,11 +177,8 @@ def test_counts_handles():
 
 def test_lists_components_and_takes_the_one_asked_for():
     pair = joined(ball(subdivisions=1), ball(2.0, (5, 0, 0)))
-    with pytest.raises(
-        MeshError,
-        match=r"2 components \(0: 320 faces, 1: 80 faces\): choose one with --component largest or --component N",
-    ):
-        surface_from_arrays(*pair)
+    both = surface_from_arrays(*pair)
+    assert both.notices == ("2 bodies are kept (0: 320 faces, 1: 80 faces): --component takes one",)
     small = surface_from_arrays(*pair, component=1)
     assert len(small.faces) == 80
     assert any("component 1 taken of 2" in line for line in small.notices)
@@ -190,16 +187,17 @@ def test_lists_components_and_takes_the_one_asked_for():
         surface_from_arrays(*pair, component=2)
 
 
-def test_refuses_nested_shells():
-    outer, (vertices, faces) = ball(2.0), ball(subdivisions=1)
-    with pytest.raises(MeshError, match="2 nested shells .* component 1 lies inside component 0"):
-        surface_from_arrays(*joined(outer, (vertices, faces[:, ::-1])))
-
-
-def test_the_shell_inside_may_have_more_faces():
-    outer, (vertices, faces) = ball(2.0, subdivisions=1), ball(subdivisions=3)
-    with pytest.raises(MeshError, match=r"component 0 lies inside component 1: .* by choosing --component 1"):
-        surface_from_arrays(*joined(outer, (vertices, faces[:, ::-1])))
+@pytest.mark.parametrize("subdivisions", [1, 3])  # the shell inside may have more faces
+@pytest.mark.parametrize("turned", [1, -1])
+def test_a_shell_inside_is_a_cavity_however_it_is_wound(turned, subdivisions):
+    outer, (vertices, faces) = ball(2.0, subdivisions=2), ball(1.0, subdivisions=subdivisions)
+    surface = surface_from_arrays(*joined(outer, (vertices, faces[:, ::turned])))
+    rest = surface_from_arrays(*outer).volume - surface_from_arrays(vertices, faces).volume
+    assert surface.volume == pytest.approx(rest) and (surface.shells, surface.genus) == (2, 0)
+    assert surface.solids == ("",) and not surface.is_plain and not len(surface.crossings)
+    assert 1.0 < np.linalg.norm(surface.center) < 2.0  # the deepest point lies between the shells
+    assert any(line.startswith("1 cavity is kept, ") for line in surface.notices)
+    assert surface.summary()["shells"] == 2
 
 
 def test_touching_sheets_of_a_closed_mesh_are_not_welded():

@@ -4,7 +4,7 @@ import re
 
 import numpy as np
 import pytest
-from mesh_files import ball, joined, obj
+from mesh_files import CUBE, TRIANGLES, ball, joined, obj
 
 from parameterize.surface.surface import MeshError, bodies_in, surface_from_arrays
 
@@ -46,9 +46,48 @@ def test_bodies_that_cross_are_named_with_a_place():
         assert np.linalg.norm(place - middle) == pytest.approx(1.0, abs=0.1)
 
 
+def test_a_body_in_a_cavity_is_a_second_one():
+    surface = surface_from_arrays(*joined(ball(3.0), ball(2.0), ball(1.0)))
+    volumes = [surface_from_arrays(*ball(radius)).volume for radius in (3.0, 2.0, 1.0)]
+    assert surface.volume == pytest.approx(volumes[0] - volumes[1] + volumes[2])
+    radii = np.linalg.norm(surface.vertices[surface.faces[:, 0]], axis=1)
+    assert len(surface.solids) == 2 and np.array_equal(surface.owners, np.where(radii < 1.5, 1, 0))
+
+
+def cube(low, size=1.0):
+    return CUBE * size + low, TRIANGLES
+
+
+def test_bodies_that_touch_in_equal_triangles_are_glued():
+    surface = surface_from_arrays(*joined(cube((0, 0, 0)), cube((0, 0, 1))), groups={"lower": np.arange(12)})
+    assert surface.volume == pytest.approx(2.0) and (surface.shells, len(surface.faces)) == (1, 20)
+    assert surface.solids == ("lower", "") and np.bincount(surface.owners).tolist() == [10, 10]
+    assert np.all(surface.walls.corners[..., 2] == 1.0) and surface.walls.solids.tolist() == [[0, 1], [0, 1]]
+    assert "glued solids over an area of 1, 2 faces" in surface.notices
+
+
+def test_bodies_that_touch_in_an_edge_are_not_glued():
+    surface = surface_from_arrays(*joined(cube((0, 0, 0)), cube((1, 1, 0))))
+    assert surface.shells == 2 and not len(surface.walls.corners) and not len(surface.crossings)
+
+
+@pytest.mark.parametrize("low", [(0.25, 0.25, 1.0), (0.25, 0.25, 0.5)])  # beside each other; one in the other
+def test_bodies_that_touch_in_other_triangles_are_refused(low):
+    with pytest.raises(MeshError, match="components 0 and 1 cross each other at"):
+        surface_from_arrays(*joined(cube((0, 0, 0)), cube(low, 0.5)))
+
+
+def test_bodies_whose_faces_fall_into_other_triangles_are_refused():
+    vertices = CUBE * (-1, 1, 1) + (1, 0, 1)  # mirrored: other diagonals between the same corners
+    with pytest.raises(MeshError, match="components 0 and 1 overlap, or touch in faces that do not match, at"):
+        surface_from_arrays(*joined(cube((0, 0, 0)), (vertices, TRIANGLES[:, ::-1])))
+
+
 def test_open_bodies_are_measured_too_and_only_the_chosen_one_is_closed():
     (vertices, faces), (far, small) = ball(2.0, subdivisions=3), ball(1.0, (5, 0, 0), 4)
     pair = joined((vertices, faces[1:]), (far, small[9:]))
+    with pytest.raises(MeshError, match="2 components .*, component 0 is open: choose one with --component largest"):
+        surface_from_arrays(*pair)
     surface = surface_from_arrays(*pair, component="largest", close=True)
     assert len(surface.faces) == len(faces) and surface.center == pytest.approx([0, 0, 0], abs=0.1)
 

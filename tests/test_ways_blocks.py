@@ -51,7 +51,7 @@ def test_other_bodies_without_handles_stay_one_cube(skeleton, reason):
 
 def with_handles(skeleton):
     """A task of a body whose skeleton has handles."""
-    return SimpleNamespace(surface=SimpleNamespace(genus=skeleton.handles), skeleton=skeleton)
+    return SimpleNamespace(surface=SimpleNamespace(is_plain=True, genus=skeleton.handles), skeleton=skeleton)
 
 
 def test_a_body_with_limbs_and_a_plate_with_one_hole_get_blocks():

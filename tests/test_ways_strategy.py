@@ -51,7 +51,7 @@ def task_of(surface=None, config=None):
 def next_way(before, ways, most=4):
     """The way that the strategy takes after these, of a body that all suit."""
     task = SimpleNamespace(
-        most_starts=most, surface=SimpleNamespace(genus=0), config=SimpleNamespace(blocks=None, starts=4)
+        most_starts=most, surface=SimpleNamespace(is_plain=True, genus=0), config=SimpleNamespace(blocks=None, starts=4)
     )
     left = ways[1 + max((ways.index(one.way) for one in before), default=-1) :]
     return next((way for way in left if strategy._is_next(way, before, task)), None)
@@ -128,13 +128,15 @@ def test_where_no_blocks_fit_a_body_without_handles_one_cube_is_tried(monkeypatc
 
 
 def test_one_cube_does_not_follow_blocks_of_a_body_with_handles():
-    ring = Mock(surface=SimpleNamespace(genus=1), config=SimpleNamespace(blocks=None, starts=4))
+    ring = Mock(surface=SimpleNamespace(is_plain=True, genus=1), config=SimpleNamespace(blocks=None, starts=4))
     assert not any(way.suits(ring).applies for way in (SHARP, *CUBES))
 
 
 def test_one_cube_is_refused_for_a_body_with_handles():
     task = SimpleNamespace(
-        surface=SimpleNamespace(genus=2), config=SimpleNamespace(blocks=1), checkpoints=Checkpoints.none()
+        surface=SimpleNamespace(is_plain=True, genus=2),
+        config=SimpleNamespace(blocks=1),
+        checkpoints=Checkpoints.none(),
     )
     with pytest.raises(LayoutError, match="genus 2: one cube is never mapped one-to-one onto a body with handles"):
         first_way(task, WAYS)

@@ -1,4 +1,4 @@
-"""The bodies of a surface: copies are dropped, one is chosen, cavities are told."""
+"""The bodies of a surface: copies are dropped, and one is chosen or all are kept."""
 
 from numbers import Integral
 from typing import Literal
@@ -6,18 +6,17 @@ from typing import Literal
 import igl
 import numpy as np
 
-from ..arrays import Array, IntArray, in_brackets
+from ..arrays import Array, IntArray
 from .errors import MeshError
-from .geometry import connected, directed_edges
+from .geometry import edge_table
+from .holes import Close
 from .mesh_repair import MeshRepair
-from .solid import Solid
-from .topology import crossing_faces, crossing_places
+from .shells import components, inside, labels_of, sizes_of
 from .welding import is_oriented
 
 Choice = int | Literal["largest"] | None
 
 LARGEST = "largest"  # in volume
-LISTED = 8
 
 
 def check_choice(component: object) -> None:
@@ -27,15 +26,17 @@ def check_choice(component: object) -> None:
     raise MeshError(f"component must be a whole number, counted from 0, or {LARGEST!r}, got {component!r:.80}")
 
 
-def choose_component(mesh: MeshRepair, component: Choice) -> tuple[MeshRepair, list[str]]:
-    """Return the only or the chosen component (0 has most faces), and notices. Raises MeshError."""
+def choose_component(mesh: MeshRepair, component: Choice, close: Close) -> tuple[MeshRepair, list[str]]:
+    """Return the chosen component (0 has most faces), or all of them for None, and notices.
+
+    Raises MeshError for a component that does not exist, and for one of several that is open and is not closed.
+    """
     mesh, groups, copies = _without_copies(mesh)
-    if component is None and len(groups) == 1:
-        return mesh, copies
-    sizes = ", ".join(f"{i}: {len(group)} faces" for i, group in enumerate(groups[:LISTED]))
-    sizes += f", and {len(groups) - LISTED} more" if len(groups) > LISTED else ""
     if component is None:
-        raise MeshError(_many(mesh, groups, sizes))
+        if len(groups) > 1 and not close:
+            _check_closed(mesh, groups)
+        return mesh, copies
+    sizes = sizes_of(groups)
     volumes = _volumes(mesh, groups)
     chosen = int(np.argmax(volumes)) if component == LARGEST else int(component)
     if chosen >= len(groups):
@@ -43,7 +44,7 @@ def choose_component(mesh: MeshRepair, component: Choice) -> tuple[MeshRepair, l
     if len(groups) == 1:
         return mesh.with_faces(groups[0]), copies
     notice = f"component {chosen} taken of {len(groups)} ({sizes})"
-    nested = _inside(mesh, groups, chosen)
+    (nested,) = inside(mesh, groups, [chosen])
     if nested:
         named = f"component {nested[0]}" if len(nested) == 1 else f"{len(nested)} components"
         share = float(volumes[nested].sum()) / volumes[chosen]
@@ -55,81 +56,35 @@ def choose_component(mesh: MeshRepair, component: Choice) -> tuple[MeshRepair, l
     return mesh.with_faces(groups[chosen]), [*copies, notice]
 
 
-def components(faces: IntArray) -> list[IntArray]:
-    """Return the face numbers of each component (faces sharing a vertex), the largest first."""
-    label = connected(directed_edges(faces), int(faces.max()) + 1)[faces[:, 0]]
-    order = np.argsort(label, kind="stable")
-    groups = np.split(order, np.flatnonzero(np.diff(label[order])) + 1)
-    return sorted(groups, key=lambda group: (-len(group), int(group[0])))
-
-
 def outer_bodies(mesh: MeshRepair) -> list[int | None]:
-    """Return the numbers of the components that lie inside no other one; None alone where there is one component."""
+    """Return the numbers of the components that lie inside no other one; None alone where there is one of these."""
     mesh, groups, _ = _without_copies(mesh)
     if len(groups) == 1:
         return [None]
-    inner = {number for outer in range(len(groups)) for number in _inside(mesh, groups, outer)}
-    return [number for number in range(len(groups)) if number not in inner]
+    inner = set().union(*inside(mesh, groups, range(len(groups))))
+    outer = [number for number in range(len(groups)) if number not in inner]
+    return [None] if len(outer) == 1 else [*outer]
 
 
-def _many(mesh: MeshRepair, groups: list[IntArray], sizes: str) -> str:
-    """Return the refusal of several components."""
-    widths = [np.linalg.norm(np.ptp(mesh.points[np.unique(mesh.faces[group])], axis=0)) for group in groups[:LISTED]]
-    outer = int(np.argmax(widths))
-    nested = _inside(mesh, groups, outer)
-    if nested:
-        return (
-            f"{len(groups)} nested shells ({sizes}), component {nested[0]} lies inside component {outer}: a body "
-            f"with a cavity gets no map, of one cube or of blocks; fill it by choosing --component {outer}, or connect "
-            "it with the outside by a hole"
-        )
-    if (crossed := _crossed(mesh, groups)) is not None:
-        (first, second), place = crossed
-        return (
-            f"{len(groups)} components ({sizes}), components {first} and {second} cross each other at "
-            f"{in_brackets(place)}: unite them in the program that made them, or choose one with --component largest "
-            "or --component N"
-        )
-    return (
-        f"{len(groups)} components ({sizes}): choose one with --component largest or --component N, take each with "
-        "`iga-nn batch --split`, or join them"
-    )
-
-
-def _crossed(mesh: MeshRepair, groups: list[IntArray]) -> tuple[tuple[int, int], Array] | None:
-    """Return two components that cross each other, and a place (3,) in the user's units; None where there are none."""
-    pairs = crossing_faces(mesh.points, mesh.faces)
-    owners = np.sort(_labels(groups)[pairs], axis=1)
-    between = np.flatnonzero(owners[:, 0] != owners[:, 1])
-    if not len(between):
-        return None
-    first, second = owners[between[0]].tolist()
-    (place,) = crossing_places(mesh.points, mesh.faces, pairs[between[:1]])
-    return (first, second), place * mesh.size + mesh.middle
+def _check_closed(mesh: MeshRepair, groups: list[IntArray]) -> None:
+    """Raise MeshError where one of several components is open."""
+    for number, group in enumerate(groups):
+        if edge_table(mesh.faces[group])[1].min() < 2:
+            raise MeshError(
+                f"{len(groups)} components ({sizes_of(groups)}), component {number} is open: choose one with "
+                "--component largest or --component N, or fill its holes with --close"
+            )
 
 
 def _volumes(mesh: MeshRepair, groups: list[IntArray]) -> Array:
     """Return the volume that each component encloses, in the box of side 1; of an open one, about its middle."""
     faces = mesh.faces if is_oriented(mesh.faces) else np.asarray(igl.bfs_orient(mesh.faces)[0])
-    label = _labels(groups)
+    label = labels_of(groups)
     corners = mesh.points[faces]  # (m, 3, 3)
     count = np.bincount(label)
     middle = np.stack([np.bincount(label, corners[:, :, k].mean(axis=1)) / count for k in range(3)], axis=1)
     a, b, c = (corners[:, k] - middle[label] for k in range(3))
     return np.asarray(abs(np.bincount(label, np.sum(np.cross(a, b) * c, axis=1) / 6.0)))
-
-
-def _inside(mesh: MeshRepair, groups: list[IntArray], outer: int) -> list[int]:
-    """Return the numbers of the components that lie inside one of them."""
-    corners = [mesh.points[mesh.faces[group]].reshape(-1, 3) for group in groups]
-    low, high = corners[outer].min(axis=0), corners[outer].max(axis=0)
-    nested = []
-    for i, points in enumerate(corners):
-        if i != outer and np.all(points.min(axis=0) > low) and np.all(points.max(axis=0) < high):
-            solid = Solid(mesh.points, mesh.faces[groups[outer]])
-            if np.all(np.abs(solid.winding_numbers(points)) > 0.5):
-                nested.append(i)
-    return nested
 
 
 def _without_copies(mesh: MeshRepair) -> tuple[MeshRepair, list[IntArray], list[str]]:
@@ -138,7 +93,7 @@ def _without_copies(mesh: MeshRepair) -> tuple[MeshRepair, list[IntArray], list[
     if len(groups) == 1:
         return mesh, groups, []
     place = np.unique(mesh.points, axis=0, return_inverse=True)[1].ravel()
-    label = _labels(groups)
+    label = labels_of(groups)
     _, key = np.unique(np.sort(place[mesh.faces], axis=1), axis=0, return_inverse=True)
     first = np.full(int(key.max()) + 1, len(groups))
     np.minimum.at(first, key.ravel(), label)
@@ -151,11 +106,3 @@ def _without_copies(mesh: MeshRepair) -> tuple[MeshRepair, list[IntArray], list[
     bodies = "1 component" if len(same) == 1 else f"{len(same)} components"
     notice = f"dropped {bodies} ({np.count_nonzero(dropped)} faces) exactly on the faces of others"
     return found, components(found.faces), [f"{notice}: the volume is unchanged"]
-
-
-def _labels(groups: list[IntArray]) -> IntArray:
-    """Return the number of the component of each face (m,)."""
-    label = np.empty(sum(map(len, groups)), dtype=np.int64)
-    for number, group in enumerate(groups):
-        label[group] = number
-    return label

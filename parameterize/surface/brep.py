@@ -11,7 +11,7 @@ LOST = 1e-6  # of the area: triangles of less are degenerate, and the exact face
 
 
 def kept_brep(raw: RawMesh, old: IntArray) -> Brep:
-    """Return the B-rep of a mesh whose present triangles had the numbers `old` (m,), -1 for a triangle that is new.
+    """Return the B-rep of a mesh whose present triangles had the numbers `old` (m,), -1 for one that was added.
 
     It has no text where repairs have changed the shape: where holes were filled, or triangles are gone.
     """

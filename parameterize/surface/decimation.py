@@ -77,12 +77,20 @@ def _collapsed(surface: Surface, max_faces: int, *, block: bool) -> tuple[Surfac
     moved = igl.hausdorff(unit, surface.faces, vertices, faces) / surface.scale
     smaller = surface_from_arrays(surface.from_unit(vertices), faces, surface.name, max_faces=max_faces)
     smaller = replace(smaller, source=surface.source, unit=surface.unit)
-    return _labelled(surface, smaller) if surface.groups or surface.brep else smaller, float(moved)
+    labelled = surface.groups or surface.brep or len(surface.solids) > 1
+    return _labelled(surface, smaller) if labelled else smaller, float(moved)
 
 
 def _labelled(surface: Surface, smaller: Surface) -> Surface:
-    """Return the smaller surface whose faces have the groups and the exact face of the nearest face, each."""
+    """Return the smaller surface whose faces have the groups, the exact face and the solid of the nearest face."""
     middles = smaller.vertices[smaller.faces].mean(axis=1)
     nearest = surface.part.nearest(middles, doubled_areas(smaller.vertices, smaller.faces))
-    groups, exact = renumbered(surface.groups, nearest), surface.brep_faces[nearest]
-    return replace(smaller, groups=groups, brep=surface.brep, brep_faces=exact)
+    return replace(
+        smaller,
+        groups=renumbered(surface.groups, nearest),
+        brep=surface.brep,
+        brep_faces=surface.brep_faces[nearest],
+        solids=surface.solids,
+        owners=surface.owners[nearest],
+        walls=surface.walls,
+    )

@@ -4,18 +4,22 @@ Nothing is repaired without a notice that says what was changed, and by how much
 """
 
 from dataclasses import dataclass, replace
+from itertools import chain
 
 import numpy as np
 
-from ..arrays import Array, IntArray
+from ..arrays import Array, IntArray, listed
 from .bodies import Choice, check_choice, choose_component
 from .errors import LARGEST, MeshError, check_face_count
+from .gluing import Solids, glued
 from .holes import Close, check_close, close_holes
 from .mesh_repair import MeshRepair
 from .readers.file import RawMesh
 from .sheets import split, without_doubled, without_flaps
-from .topology import check_edges, check_vertices
-from .welding import weld_and_drop, wind_alike, wind_outward
+from .shells import wound_as_walls
+from .solids import only
+from .topology import check_edges, check_vertices, crossing_faces
+from .welding import weld_and_drop, wind_alike
 
 USUAL_SIZES = (1e-6, 1e6)
 
@@ -29,20 +33,60 @@ class Asked:
     max_faces: int
 
 
-def mend(raw: RawMesh, asked: Asked) -> tuple[MeshRepair, list[str]]:
-    """Return the closed surface of one component, wound outward, and notices. Raises MeshError."""
+def mend(raw: RawMesh, asked: Asked) -> tuple[Solids, list[str]]:
+    """Return the outer boundary of the solids, closed and wound as it bounds them, and notices. Raises MeshError."""
     check_choice(asked.component)
     check_close(asked.close)
+    mesh, owners, notices = (_of_solids if len(raw.solids) > 1 else _of_components)(raw, asked)
+    names = _names(raw, mesh, owners)
+    if len(names) == 1:
+        return Solids(mesh, owners, names, crossing_faces(mesh.points, mesh.faces)), notices
+    solids, touching = glued(mesh, owners, names)
+    check_edges(solids.mesh.faces, solids.mesh.where)
+    check_vertices(solids.mesh.faces, solids.mesh.where)
+    return solids, [*notices, *touching]
+
+
+def _of_components(raw: RawMesh, asked: Asked) -> tuple[MeshRepair, IntArray, list[str]]:
+    """Return the closed components of a mesh, wound as walls of bodies, the body of each face, and notices."""
     mesh, mended = without_defects(raw, asked.max_faces)
-    mesh, chosen = choose_component(mesh, asked.component)
+    mesh, chosen = choose_component(mesh, asked.component, asked.close)
     mesh = mesh.compact()
     check_edges(mesh.faces, mesh.where)
     alike, turned = wind_alike(mesh.faces)
     mesh, closed = close_holes(replace(mesh, faces=alike), asked.close)
     check_edges(mesh.faces, mesh.where)
     check_vertices(mesh.faces, mesh.where)
-    faces, outward = wind_outward(mesh.points, mesh.faces)
-    return replace(mesh, faces=faces), [*mended, *chosen, *turned, *closed, *outward]
+    mesh, owners, outward = wound_as_walls(mesh)
+    return mesh, owners, [*mended, *chosen, *turned, *closed, *outward]
+
+
+def _of_solids(raw: RawMesh, asked: Asked) -> tuple[MeshRepair, IntArray, list[str]]:
+    """Return the meshes of several solids as one, each mended by itself, the solid of each face, and notices."""
+    check_face_count(len(raw.faces), asked.max_faces)
+    found = [_of_components(only(replace(raw, notices=()), (solid,)), asked) for solid in raw.solids]
+    meshes, notices = [mesh for mesh, _, _ in found], [lines for _, _, lines in found]
+    rows = zip(meshes, raw.solids, strict=True)
+    old = np.concatenate([np.where(mesh.old < 0, -1, solid.triangles[mesh.old]) for mesh, solid in rows])
+    starts = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes)])
+    vertices = np.concatenate([mesh.vertices for mesh in meshes])
+    faces = np.concatenate([mesh.faces + start for mesh, start in zip(meshes, starts, strict=False)])
+    middle, size, _ = _box(vertices, faces)
+    whole = MeshRepair(vertices, (vertices - middle) / size, faces, old, middle, size)
+    owners = np.repeat(np.arange(len(meshes)), [len(mesh.faces) for mesh in meshes])
+    told = {line: [k for k, lines in enumerate(notices) if line in lines] for line in dict.fromkeys(chain(*notices))}
+    return whole, owners, [*raw.notices, *(f"solid {listed(numbers)}: {line}" for line, numbers in told.items())]
+
+
+def _names(raw: RawMesh, mesh: MeshRepair, owners: IntArray) -> tuple[str, ...]:
+    """Return the names of the bodies of a mesh: that of the solid, or of the first group that has all of its faces."""
+    count = int(owners.max()) + 1
+    if count == len(raw.solids):
+        return tuple(solid.name for solid in raw.solids)
+    if count == 1:
+        return ("",)
+    rows = [mesh.old[owners == number] for number in range(count)]
+    return tuple(next((name for name, own in raw.groups.items() if np.isin(row, own).all()), "") for row in rows)
 
 
 def without_defects(raw: RawMesh, max_faces: int) -> tuple[MeshRepair, list[str]]:

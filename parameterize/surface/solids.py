@@ -1,21 +1,24 @@
-"""The solids of a file that has several: one is taken before points are welded, so that those that touch stay apart."""
+"""The solids of a file: told apart, or one taken, before points are welded, so that those that touch stay apart."""
 
 from dataclasses import replace
 
 import numpy as np
 
-from .bodies import LARGEST, LISTED, Choice, check_choice
+from .bodies import LARGEST, Choice, check_choice
 from .errors import MeshError
 from .geometry import signed_volume
+from .gluing import CHOOSE
 from .groups import renumbered
 from .readers.common import SolidPart, Solids
 from .readers.file import RawMesh
+from .shells import LISTED
 
 
-def one_solid(raw: RawMesh, component: Choice) -> tuple[RawMesh, Choice]:
-    """Return the mesh of one solid, and the component of it that is to be taken; raise MeshError where none is chosen.
+def solids_of(raw: RawMesh, component: Choice) -> tuple[RawMesh, Choice]:
+    """Return the mesh of all solids, or of the chosen one, and the component of it that is to be taken.
 
-    Solids are numbered as components are: 0 has most faces. A mesh that is not of several solids is returned as it is.
+    To choose, solids are numbered as components are: 0 has most faces. Those that are kept stay in their order. A mesh
+    that is not of solids is returned as it is. Raises MeshError where all are kept and cannot be taken together.
     """
     check_choice(component)
     if not raw.solids:
@@ -24,14 +27,14 @@ def one_solid(raw: RawMesh, component: Choice) -> tuple[RawMesh, Choice]:
     copies = len(raw.solids) - len(solids)
     told = (f"dropped copies of solids in the same place: {copies}",) if copies else ()
     if len(solids) == 1:
-        return _only(raw, solids[0], told), component
+        return only(raw, solids, told), component
     sizes = "; ".join(f"{k}: {_described(solid)}" for k, solid in enumerate(solids[:LISTED]))
     sizes += f"; and {len(solids) - LISTED} more" if len(solids) > LISTED else ""
     if component is None:
-        raise MeshError(
-            f"{len(solids)} solids ({sizes}): choose one with --component largest or --component N, take each with "
-            "`iga-nn batch --split`, or unite them in the program that made them"
-        )
+        if raw.conflict:
+            raise MeshError(f"{len(solids)} solids ({sizes}), {raw.conflict}: {CHOOSE}")
+        kept = f"{len(solids)} solids are kept ({sizes}): --component takes one"
+        return only(raw, tuple(sorted(solids, key=lambda one: int(one.triangles[0]))), (*told, kept)), None
     volumes = [abs(signed_volume(raw.vertices, raw.faces[one.triangles])) for one in solids]
     chosen = int(np.argmax(volumes)) if component == LARGEST else int(component)
     if chosen >= len(solids):
@@ -40,7 +43,7 @@ def one_solid(raw: RawMesh, component: Choice) -> tuple[RawMesh, Choice]:
     taken = (
         f"solid {chosen} taken of {len(solids)} ({sizes}), of volume {volumes[chosen]:.3g}; the others have {rest:.3g}"
     )
-    return _only(raw, solids[chosen], (*told, taken)), "largest"  # with its voids filled
+    return only(raw, (solids[chosen],), (*told, taken)), "largest"  # with its voids filled
 
 
 def _described(solid: SolidPart) -> str:
@@ -56,15 +59,19 @@ def distinct_solids(raw: RawMesh) -> Solids:
     return tuple(sorted(found.values(), key=lambda solid: (-len(solid.triangles), int(solid.triangles[0]))))
 
 
-def _only(raw: RawMesh, solid: SolidPart, notices: tuple[str, ...]) -> RawMesh:
-    """Return the mesh of one solid, with notices."""
-    used, corners = np.unique(raw.faces[solid.triangles], return_inverse=True)
+def only(raw: RawMesh, solids: Solids, notices: tuple[str, ...] = ()) -> RawMesh:
+    """Return the mesh of some of the solids, with notices."""
+    rows = np.concatenate([solid.triangles for solid in solids])
+    ends = np.cumsum([len(solid.triangles) for solid in solids])
+    numbers = np.split(np.arange(len(rows)), ends[:-1])
+    used, corners = np.unique(raw.faces[rows], return_inverse=True)
+    whole = raw.brep and replace(raw.brep, faces=raw.brep.faces[rows])
     return replace(
         raw,
         vertices=raw.vertices[used],
         faces=corners.reshape(-1, 3),
         notices=(*raw.notices, *notices),
-        groups=renumbered(raw.groups, solid.triangles),
-        solids=(),
-        brep=solid.brep,
+        groups=renumbered(raw.groups, rows),
+        solids=tuple(replace(solid, triangles=own) for solid, own in zip(solids, numbers, strict=True)),
+        brep=solids[0].brep if len(solids) == 1 else whole,
     )

@@ -1,4 +1,4 @@
-"""Surface: a closed surface of one component, checked and repaired, or a MeshError that says why it is refused."""
+"""Surface: the closed surface of a body, checked and repaired, or a MeshError that says why it is refused."""
 
 import hashlib
 import logging
@@ -24,14 +24,16 @@ from .errors import (
 )
 from .features import SHARP, Features, features_of
 from .geometry import signed_volume
+from .gluing import NO_WALLS, Walls
 from .groups import Groups, checked, renumbered
 from .holes import Close
 from .mending import Asked, mend, without_defects
 from .part import PartSurface
 from .readers.file import RawMesh, read_mesh
 from .readers.objects import READERS, class_of, read_object
+from .shells import components
 from .solid import Solid
-from .solids import distinct_solids, one_solid
+from .solids import distinct_solids, solids_of
 
 if TYPE_CHECKING:
     import meshio
@@ -46,7 +48,9 @@ logger = logging.getLogger(__name__)
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Surface(Brief, Shown):
-    """A closed surface of one component, wound outward, with its placement in the unit cube's space.
+    """The closed surface of a body, wound outward, with its placement in the unit cube's space.
+
+    It has several components where the body has cavities, whose walls are wound out of the body, or several solids.
 
     `load_surface`, `surface_from_arrays` and `sample` make surfaces.
 
@@ -84,6 +88,13 @@ class Surface(Brief, Shown):
         where there is none, or where repairs have changed the shape.
     brep_faces : (m,) array of int
         The face of each triangle, in the order of `brep`, counted from 1; 0 for a triangle of none.
+    solids : tuple of str
+        The names of the solids, in the order of `brep`; "" for one without a name.
+    owners : (m,) array of int
+        The solid of each triangle, counted from 0.
+    walls : Walls
+        The triangles between solids that touch, which are not among `faces`: `corners` (k, 3, 3) in the user's units,
+        and `solids` (k, 2), the two solids of each.
 
     Examples
     --------
@@ -110,6 +121,9 @@ class Surface(Brief, Shown):
     sharp: float = SHARP
     brep: bytes = field(default=b"", repr=False)
     brep_faces: IntArray = field(default_factory=lambda: np.empty(0, dtype=np.int64))
+    solids: tuple[str, ...] = ("",)
+    owners: IntArray = field(default_factory=lambda: np.empty(0, dtype=np.int64))
+    walls: Walls = NO_WALLS
 
     def to_unit(self, points: ArrayLike) -> Array:
         """Return points (..., 3) in the user's units as placed points."""
@@ -125,9 +139,19 @@ class Surface(Brief, Shown):
         return float(self.scale**-3.0)
 
     @cached_property
+    def shells(self) -> int:
+        """Return the number of connected components of the surface."""
+        return len(components(self.faces))
+
+    @property
+    def is_plain(self) -> bool:
+        """Return whether the body is one solid without cavities."""
+        return self.shells == len(self.solids) == 1
+
+    @cached_property
     def genus(self) -> int:
-        """Return the number of handles."""
-        return topology.genus_of(self.faces)
+        """Return the number of handles, of all shells together."""
+        return topology.genus_of(self.faces) + self.shells - 1
 
     @cached_property
     def features(self) -> Features:
@@ -162,6 +186,7 @@ class Surface(Brief, Shown):
             "faces": len(self.faces),
             "volume": self.volume,
             "genus": self.genus,
+            **({} if self.is_plain else {"shells": self.shells, "solids": list(self.solids)}),
             "bbox": [corner.tolist() for corner in self.bbox],
             **({"unit": self.unit} if self.unit else {}),
             "self_intersections": {
@@ -204,7 +229,7 @@ def load_surface(
     ----------
     mesh : str or Path, or a trimesh.Trimesh, pyvista.PolyData or meshio.Mesh
         The path of a surface (.obj, .stl, .ply, .off, .glb, .gltf, .3mf, .vtp), of cells (.mesh, .msh, .vtu, .vtk) or
-        of a solid model (.step, .iges, with the extra `cad`), each also as .gz or .zip, or a mesh in memory. Of solid
+        of a solid model (.step, .iges), each also as .gz or .zip, or a mesh in memory. Of solid
         cells the boundary is taken.
     component : int or "largest", optional
         The component to take where there are several: 0 has most faces, "largest" encloses most volume.
@@ -263,12 +288,12 @@ def load_surface(
 def bodies_in(path: Path, max_faces: int = MAX_FACES) -> list[int | None]:
     """Return the numbers of the components of a file that are bodies of their own, as `component` of `load_surface`.
 
-    One inside another is none. None alone stands for the only component. Raises MeshError for a file that is refused.
+    One inside another is none. None alone stands for all of the file. Raises MeshError for a file that is refused.
     """
     raw = read_mesh(path, max_faces)
     if (count := len(distinct_solids(raw))) > 1:
         return list(range(count))
-    return outer_bodies(without_defects(one_solid(raw, None)[0], max_faces)[0])
+    return outer_bodies(without_defects(solids_of(raw, None)[0], max_faces)[0])
 
 
 def surface_from_arrays(
@@ -345,17 +370,18 @@ def _array(values: ArrayLike, name: str) -> NDArray[Any]:
 
 def _gate(raw: RawMesh, name: str, source: str, asked: Asked) -> Surface:
     """Make a surface: mend it, check its topology, place it."""
-    raw, component = one_solid(raw, asked.component)
-    repaired, mended = mend(raw, replace(asked, component=component))
+    raw, component = solids_of(raw, asked.component)
+    solids, mended = mend(raw, replace(asked, component=component))
+    repaired = solids.mesh
     points, triangles = repaired.points, repaired.faces
     doubts = topology.slivers(points, triangles, repaired.where)
-    crossings = topology.crossing_faces(points, triangles)
+    crossings = solids.crossings
     if len(crossings):
         doubts.append(topology.describe_crossings(repaired.vertices, triangles, crossings))
     deepest, _ = Solid(points, triangles).deepest()
     unit_scale = signed_volume(points, triangles) ** (-1.0 / 3.0)
     placed = unit_scale * (points - deepest) + 0.5
-    exact = kept_brep(raw, repaired.old)
+    exact = kept_brep(raw, solids.old)
     return Surface(
         name=name,
         vertices=repaired.vertices,
@@ -370,5 +396,8 @@ def _gate(raw: RawMesh, name: str, source: str, asked: Asked) -> Surface:
         groups=renumbered(raw.groups, repaired.old),
         unit=raw.unit,
         brep=exact.text,
-        brep_faces=exact.faces,
+        brep_faces=exact.faces[: len(triangles)],
+        solids=solids.names,
+        owners=solids.owners,
+        walls=solids.walls,
     )

@@ -6,10 +6,9 @@ from scipy.spatial import KDTree
 
 from ..arrays import Array, IntArray, Mask
 from .errors import MeshError
-from .geometry import connected, directed_edges, doubled_areas, edge_table, signed_volume
+from .geometry import connected, directed_edges, doubled_areas, edge_table
 
 WELD_TOLERANCE = 1e-7  # share of the box's longest side: points this close are one in single precision
-LEAST_VOLUME = 1e-12  # share of the cube over the box's longest side
 FLAT = 1e-14  # twice a face's area over its longest edge squared, below which it counts as degenerate
 
 
@@ -31,7 +30,7 @@ def weld_and_drop(vertices: Array, faces: IntArray) -> tuple[IntArray, IntArray,
     closed = is_closed(solid)
     edges = edge_table(solid)[0]
     short = edges[np.linalg.norm(np.subtract(*vertices[edges.T]), axis=1) <= WELD_TOLERANCE]
-    label = connected(short if closed else _close_pairs(vertices, solid), len(vertices))
+    label = connected(short if closed else close_pairs(vertices, solid), len(vertices))
     welded = np.unique(label, return_index=True)[1][label][solid]  # the lowest number of the joined vertices
     apart = _distinct(welded)
     if closed and not is_closed(welded[apart]):
@@ -63,16 +62,6 @@ def wind_alike(faces: IntArray) -> tuple[IntArray, list[str]]:
     return wound, [f"repaired inconsistent winding: {min(count, len(faces) - count)} faces flipped"]
 
 
-def wind_outward(vertices: Array, faces: IntArray) -> tuple[IntArray, list[str]]:
-    """Return the faces (m, 3) of a closed component, wound alike, wound outward, and a notice; its box has side 1."""
-    volume = signed_volume(vertices, faces)
-    if abs(volume) < LEAST_VOLUME:
-        raise MeshError("encloses no volume (a flat or doubled sheet): give it thickness")
-    if volume < 0:
-        return faces[:, ::-1].copy(), ["inverted orientation flipped: faces now point outward"]
-    return faces, []
-
-
 def is_oriented(faces: IntArray) -> bool:
     """Return whether no two faces run along an edge in the same direction."""
     edges = directed_edges(faces)
@@ -92,7 +81,7 @@ def _areas(vertices: Array, faces: IntArray) -> Array:
     return np.linalg.norm(doubled_areas(vertices, faces), axis=1) / np.maximum(longest, 1e-300)
 
 
-def _close_pairs(vertices: Array, faces: IntArray) -> IntArray:
+def close_pairs(vertices: Array, faces: IntArray) -> IntArray:
     """Return pairs (k, 2) that link used vertices within the tolerance: in cells of a fine grid, then between cells."""
     used = np.unique(faces)
     cell = np.zeros(len(used), dtype=np.int64)

@@ -66,6 +66,8 @@ class AlongSkeleton(Way):
 
     def suits(self, task: MappingTask) -> Suits:
         """Return whether the body has handles, or is nearly all limbs that are long, or the options ask for blocks."""
+        if not task.surface.is_plain:
+            return Suits(False)
         if task.surface.genus:
             return Suits(True, _of_handles(task.skeleton))
         if task.config.blocks is not None or task.given_corners is not None:

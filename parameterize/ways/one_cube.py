@@ -29,8 +29,8 @@ class OneCube(Way):
     """Describe a way to a map of one cube."""
 
     def suits(self, task: MappingTask) -> Suits:
-        """Return whether the body has no handles, and the options do not ask for several blocks."""
-        return Suits(task.surface.genus == 0 and (task.config.blocks or 1) == 1)
+        """Return whether the body has no handles and no cavities, and the options do not ask for several blocks."""
+        return Suits(task.surface.is_plain and task.surface.genus == 0 and (task.config.blocks or 1) == 1)
 
 
 def surface_on_cube(task: MappingTask, turn: int) -> CubeLayout:

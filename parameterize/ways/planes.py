@@ -40,7 +40,7 @@ PLANES = BoundedByPlanes("planes", "laying exact blocks along the planes")
 def _exact_blocks(task: MappingTask) -> Complex | None:
     """Return exact blocks of a body that planes bound, at volume 1; None for others, and for given corners."""
     surface, spline, most = task.surface, task.config.spline, task.config.blocks
-    if task.given_corners is not None or len(surface.crossings):
+    if task.given_corners is not None or len(surface.crossings) or len(surface.solids) > 1:
         return None
 
     def find() -> Complex | None:

@@ -35,7 +35,7 @@ STACKS = StackOfExtrusions("stacks", "laying blocks along the outlines of extrus
 def _stacked_blocks(task: MappingTask) -> StackedBlocks | None:
     """Return blocks of a stack of extrusions, at volume 1; None for other bodies, and for given corners."""
     surface, most = task.surface, task.config.blocks
-    if task.given_corners is not None or len(surface.crossings):
+    if task.given_corners is not None or len(surface.crossings) or len(surface.solids) > 1:
         return None
     options = task.spans_across, task.config.spline.degree, most, surface.sharp
 

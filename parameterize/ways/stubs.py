@@ -50,7 +50,8 @@ class WithStubs(Way):
 
     def suits(self, task: MappingTask) -> Suits:
         """Return whether the body is fat, and all its handles are thin tubes that leave it and come back to it."""
-        if not task.surface.genus or task.skeleton.tube >= TUBE_OF_HANDLES or not _handles(task):
+        surface = task.surface
+        if not surface.is_plain or not surface.genus or task.skeleton.tube >= TUBE_OF_HANDLES or not _handles(task):
             return Suits(False)
         figures = f"{task.skeleton.tube:.2f} of the volume around its curves"
         handles = f"{in_words(task.skeleton.handles, 'handle')}, thin ones on a fat body"

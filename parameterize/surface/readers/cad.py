@@ -25,7 +25,7 @@ from ..groups import gathered
 from .cad_units import Unit, iges_unit, step_unit
 from .common import DAMAGED, Brep, Content, SolidPart, SurfaceFile
 
-INSTALL = "pip install 'iga-nn[cad]'"
+INSTALL = "pip install cadquery-ocp-novtk"
 PROGRAM = Path(__file__).with_name("opencascade.py")
 PATIENCE = 300.0  # seconds
 ANGLE = 0.2  # radians between neighbouring triangles of a curved face: some 31 around a full turn
@@ -71,10 +71,10 @@ def _read(file: SurfaceFile, kind: str, unit: Unit) -> Content:
     left_out = Counter(facts["left_out"]) + (passed_over(file.data) if kind == "step" else Counter())
     _check(facts, len(arrays["faces"]), left_out)
     check_face_count(len(arrays["faces"]), file.max_faces)
-    faces, owners, own = arrays["labels"].T
+    faces, owners, own, together = arrays["labels"].T
     groups = gathered((f"face{value}", np.flatnonzero(faces == value)) for value in np.unique(faces).tolist())
     names = facts["names"]
-    rows = [np.flatnonzero(owners == k) for k in range(1, len(names) + 1)] if len(names) > 1 else []
+    rows = [np.flatnonzero(owners == k) for k in range(1, len(names) + 1)]
     solids = (SolidPart(names[k], row, _brep(arrays, k + 1, own[row])) for k, row in enumerate(rows))
     return Content(
         arrays["vertices"] / unit.factor,
@@ -83,7 +83,8 @@ def _read(file: SurfaceFile, kind: str, unit: Unit) -> Content:
         groups,
         unit=unit.name,
         solids=tuple(solids),
-        brep=_brep(arrays, 0, faces),
+        brep=_brep(arrays, 0, together),
+        conflict=_conflict(facts),
     )
 
 
@@ -91,6 +92,15 @@ def _brep(arrays: Mapping[str, Any], number: int, faces: IntArray) -> Brep | Non
     """Return the B-rep of one of the solids, of all for number 0, whose triangles lie on `faces`; None without one."""
     found = arrays.get(f"brep{number}")
     return None if found is None else Brep(found.tobytes(), faces)
+
+
+def _conflict(facts: Mapping[str, Any]) -> str:
+    """Return why several solids cannot be taken together, "" where they can."""
+    if facts["failed"]:
+        return "OpenCASCADE does not find where they touch"
+    names = [facts["names"][number] for number in facts["overlap"] or ()]
+    told = " and ".join(f"{name!r:.40}" for name in names) if all(names) else "two of them"
+    return f"{told} overlap" if names else ""
 
 
 def _check(facts: Mapping[str, Any], count: int, left_out: Counter[str]) -> None:

@@ -53,7 +53,7 @@ class Brep:
 
 @dataclass(frozen=True, eq=False)
 class SolidPart:
-    """One of several solids of a file: its name, or "", the numbers of its triangles, and its exact faces."""
+    """A solid of a file: its name, or "", the numbers of its triangles, and its exact faces."""
 
     name: str
     triangles: IntArray
@@ -69,7 +69,8 @@ class Content:
 
     vertices: (n, 3). polygons: the vertex numbers of each face, counted from 0; they may be out of range.
     notices: one line each on data that were left out or changed. groups: numbers of polygons by name. unit: of lengths,
-    "" where the format has none. solids: where there are several. brep: of a solid model.
+    "" where the format has none. solids: of a solid model, and brep. conflict: why they
+    cannot be taken together, "" where they can.
     """
 
     vertices: Array
@@ -79,6 +80,7 @@ class Content:
     unit: str = ""
     solids: Solids = ()
     brep: Brep | None = None
+    conflict: str = ""
 
 
 def most_bytes(max_faces: int) -> int:

@@ -55,7 +55,8 @@ PACKED = (".gz", ".zip")
 class RawMesh:
     """Triangles before any repair: vertices (n, 3), faces (m, 3) with valid indices, groups; sha256 of the source.
 
-    unit: of lengths, "" where it is not known. solids: where there are several. brep: of a solid model.
+    unit: of lengths, "" where it is not known. solids: of a solid model, and brep. conflict: why they cannot be taken
+    together, "" where they can.
     """
 
     vertices: Array
@@ -66,6 +67,7 @@ class RawMesh:
     unit: str = ""
     solids: Solids = ()
     brep: Brep | None = None
+    conflict: str = ""
 
 
 def read_mesh(path: Path, max_faces: int, deflection: float | None = None) -> RawMesh:
@@ -100,7 +102,17 @@ def read_mesh(path: Path, max_faces: int, deflection: float | None = None) -> Ra
     content = READERS[suffix](SurfaceFile(data, max_faces, beside, deflection))
     vertices, faces, notices, groups = triangles_of(content, max_faces)
     digest = hashlib.sha256(stored).hexdigest()
-    return RawMesh(vertices, faces, digest, unpacked + notices, groups, content.unit, content.solids, content.brep)
+    return RawMesh(
+        vertices,
+        faces,
+        digest,
+        unpacked + notices,
+        groups,
+        content.unit,
+        content.solids,
+        content.brep,
+        content.conflict,
+    )
 
 
 def _endings(name: str) -> tuple[str, str]:

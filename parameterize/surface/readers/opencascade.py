@@ -9,12 +9,13 @@ import io
 import json
 import sys
 from collections import Counter
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from OCP.Bnd import Bnd_Box
+from OCP.BOPAlgo import BOPAlgo_Builder
 from OCP.BRep import BRep_Builder, BRep_Tool
 from OCP.BRepBndLib import BRepBndLib
 from OCP.BRepBuilderAPI import BRepBuilderAPI_Sewing, BRepBuilderAPI_Transform
@@ -180,6 +181,61 @@ def bodies_of(shape: Any) -> tuple[list[Any], str]:
     return [sewn(compound(faces))] if faces else [], "faces"
 
 
+@dataclass(frozen=True, eq=False)
+class Bodies:
+    """Bodies, and where their faces come from.
+
+    shapes: those given, with common faces where they touch. origins: for each its faces, with the numbers from 1 on
+    that they have among the faces of all given ones and of the given one. overlap: the numbers of two that overlap.
+    failed: whether common faces were not found. In both cases there are none.
+    """
+
+    shapes: list[Any]
+    origins: list[dict[ShapeKey, tuple[int, int]]]
+    overlap: tuple[int, int] | None = None
+    failed: bool = False
+
+
+def as_given(bodies: list[Any], **facts: Any) -> Bodies:
+    """Return bodies as they are."""
+    return Bodies(bodies, origins(bodies, lambda face: [face]), **facts)
+
+
+def origins(bodies: list[Any], made_of: Callable[[Any], list[Any]]) -> list[dict[ShapeKey, tuple[int, int]]]:
+    """Return, for each body, what its faces were made into, with the number of the face among all and of the body."""
+    found, number = [], 0
+    for body in bodies:
+        faces = enumerate(parts(body, TopAbs_FACE).values(), start=1)
+        found.append({ShapeKey(one): (number + own, own) for own, face in faces for one in made_of(face)})
+        number += len(parts(body, TopAbs_FACE))
+    return found
+
+
+def glued(bodies: list[Any]) -> Bodies:
+    """Return solids with common faces where they touch, by the general fuse; as they are where they overlap."""
+    fuse = BOPAlgo_Builder()
+    for body in bodies:
+        fuse.AddArgument(body)
+    fuse.SetNonDestructive(True)
+    fuse.Perform()
+    if fuse.HasErrors():
+        return as_given(bodies, failed=True)
+
+    def made_of(shape: Any) -> list[Any]:
+        return list(fuse.Modified(shape)) or [shape]
+
+    cells = [made_of(body) for body in bodies]
+    owners: dict[ShapeKey, int] = {}
+    for number, found in enumerate(cells):
+        for cell in found:
+            first = owners.setdefault(ShapeKey(cell), number)
+            if first != number and len(found) + len(cells[first]) > 2:
+                return as_given(bodies, overlap=(first, number))
+    if any(len(found) > 1 for found in cells):
+        return as_given(bodies, failed=True)
+    return Bodies([found[0] for found in cells], origins(bodies, made_of))
+
+
 def left_out(shape: Any, bodies: list[Any], kind: str) -> Counter[str]:
     """Return how many faces, curves and points of a shape are in none of the bodies that were taken of it."""
     faces = parts(shape, TopAbs_FACE)
@@ -195,20 +251,20 @@ def left_out(shape: Any, bodies: list[Any], kind: str) -> Counter[str]:
     )
 
 
-def triangles(bodies: list[Any]) -> tuple[Arrays, list[tuple[int, float]]]:
+def triangles(bodies: Bodies) -> tuple[Arrays, list[tuple[int, float]]]:
     """Return arrays, and the faces without triangles with their areas.
 
-    vertices: (n, 3). faces: (m, 3), triangles. labels: (m, 3), the face of each, its body, and its face among those of
-    the body, counted from 1.
+    vertices: (n, 3). faces: (m, 3), triangles. labels: (m, 4), of each the face as it was given, the body, the face
+    among those of the body as it was given, and the face of all bodies together, counted from 1.
     """
     points: list[tuple[float, float, float]] = []
     corners: list[tuple[int, ...]] = []
-    labels: list[tuple[int, int, int]] = []
+    labels: list[tuple[int, int, int, int]] = []
     missing: list[tuple[int, float]] = []
-    number = 0
-    for owner, body in enumerate(bodies, start=1):
-        for own, shape in enumerate(parts(body, TopAbs_FACE).values(), start=1):
-            face, place, number = TopoDS.Face(shape), TopLoc_Location(), number + 1
+    together = {part: number for number, part in enumerate(parts(compound(bodies.shapes), TopAbs_FACE), start=1)}
+    for owner, (body, given) in enumerate(zip(bodies.shapes, bodies.origins, strict=True), start=1):
+        for part, shape in parts(body, TopAbs_FACE).items():
+            face, place, (number, own) = TopoDS.Face(shape), TopLoc_Location(), given[part]
             found = BRep_Tool.Triangulation_s(face, place)
             if found is None or not found.NbTriangles():
                 missing.append((number, area(face)))
@@ -220,11 +276,11 @@ def triangles(bodies: list[Any]) -> tuple[Arrays, list[tuple[int, float]]]:
             for k in range(1, found.NbTriangles() + 1):
                 row = tuple(first + corner for corner in found.Triangle(k).Get())
                 corners.append(row[::-1] if face.Orientation() == TopAbs_REVERSED else row)
-                labels.append((number, owner, own))
+                labels.append((number, owner, own, together[part]))
     arrays = {
         "vertices": np.array(points, dtype=float).reshape(-1, 3),
         "faces": np.array(corners, dtype=int).reshape(-1, 3),
-        "labels": np.array(labels, dtype=int).reshape(-1, 3),
+        "labels": np.array(labels, dtype=int).reshape(-1, 4),
     }
     return arrays, missing
 
@@ -267,35 +323,39 @@ def main(
 ) -> None:
     """Write the arrays of `triangles`, `breps` and `facts`, a text of JSON; nothing where the file cannot be read.
 
-    breps: of the solids, the text of all together, brep0, and where there are several that of each, brep1, brep2, ...
+    breps: of the solids, the text of all together, brep0, and of each, brep1, brep2, ...
     """
-    found = read(source, kind, float(millimetres))
-    if found is None:
+    content = read(source, kind, float(millimetres))
+    if content is None:
         return
-    reader, lost = found
+    reader, lost = content
     shape = compound([]) if reader.OneShape().IsNull() else reader.OneShape()
     bodies, what = bodies_of(shape)
     beside = left_out(shape, bodies, what) + lost
-    known = dict(names_of(shape, reader)) if len(bodies) > 1 else {}
-    names = [known.get(ShapeKey(body), "") for body in bodies] if len(bodies) > 1 else []
+    known = dict(names_of(shape, reader))
+    names = [known.get(ShapeKey(body), "") for body in bodies] if what != "faces" else []
     states: list[str] = []
     if what == "solid":
         bodies, states = map(list, zip(*map(healed, bodies), strict=True))
+    found = glued(bodies) if len(bodies) > 1 and what == "solid" else as_given(bodies)
     size = diagonal(compound(bodies)) if bodies else 0.0
     wanted = max(float(deflection) or float(share) * size, LEAST)
-    for body in bodies:
+    for body in found.shapes:
         BRepMesh_IncrementalMesh(body, wanted, False, float(angle), False)
-    arrays, areas = triangles(bodies)
+    arrays, areas = triangles(found)
     facts = {
         "what": what,
         "left_out": beside,
         "names": names,
         "size": size,
         "states": Counter(states),
-        "missing": [number for number, found in areas if found > NO_AREA * size**2],
+        "missing": [number for number, lost_area in areas if lost_area > NO_AREA * size**2],
+        "overlap": found.overlap,
+        "failed": found.failed,
         "changed": kind == "step" and any(map(is_changed, placements(reader.StepModel()))),
     }
-    shapes = [compound(bodies), *(bodies if len(bodies) > 1 else [])] if what == "solid" else []
+    together = compound(parts(compound(found.shapes), TopAbs_SOLID).values())
+    shapes = [together, *bodies] if what == "solid" else []
     breps = {f"brep{k}": brep(shape, float(factor)) for k, shape in enumerate(shapes)}
     np.savez(target, facts=np.array(json.dumps(facts)), **arrays, **breps)
 
