@@ -149,7 +149,13 @@ def test_the_material_of_a_body_may_differ_by_solid(in_folder, capsys):
     assert main([*given, "--young", "steel: 1, rubber pad: 4"]) == 0
     field = BodyField.load("out/solution.npz")
     assert field.patches[1]([[1.0, 0.5, 0.5]])[0, 0] == pytest.approx(1.25, abs=1e-6)
-    assert "E = steel: 1, rubber pad: 4" in (in_folder / "out" / "report.html").read_text()
+    page, report = (in_folder / "out" / "report.html").read_text(), report_of(in_folder / "out")
+    assert "E = steel: 1, rubber pad: 4" in page and "Volume of rubber pad" in page
+    solids = report["parameterization"]["solids"]
+    assert [(solid["name"], solid["patches"]) for solid in solids] == [("steel", 1), ("rubber pad", 1)]
+    assert [solid["volume"] for solid in solids] == pytest.approx([1.0, 1.0])
+    assert main(["check", "rod.npz"]) == 0
+    assert "rubber pad, volume 1, 1 patch" in capsys.readouterr().out
     assert main([*given, "--force", "--young", "steel: 1, pad: 4"]) == 2
     assert "young: there is no solid 'pad'; the body has steel, rubber pad" in capsys.readouterr().err
     assert main(["solve", "poisson", "rod.npz", "--source", "1", "--boundary", "0", "--kappa", "steel: 1"]) == 2

@@ -78,15 +78,21 @@ def _level(level: dict[str, Any]) -> str:
 
 def volume_in_words(facts: reports.Report) -> str:
     """Return the facts of `check` about a volume as text, the verdicts first; of many patches the worst."""
-    known = ("bijective", "boundary_injective", "patches", "not_the_part", "surface_distance", "volume")
+    known = ("bijective", "boundary_injective", "patches", "solids", "not_the_part", "surface_distance", "volume")
     others = {key: value for key, value in facts.items() if key not in known}
     report = {"parameterization": facts}
     proved = {"NOT THE PART": far} if (far := reports.not_the_part(report)) else {}
     proved |= {reports.claim(report): facts["bijective"], "one-to-one": reports.one_to_one(report)}
     parts = [f"{f'{name}:':16s} {_patch(part)}" for name, part in reports.shown_patches(facts)]
+    solids = [f"{'solid:':16s} {_solid(solid)}" for solid in facts.get("solids", ())]
     heading = [] if len(parts) == len(facts.get("patches", ())) else [reports.patches_heading(facts)]
     verdicts = (f"{name:16s} {text}" for name, text in proved.items())
-    return "\n".join([*verdicts, facts_in_words(others), *heading, *parts])
+    return "\n".join([*verdicts, facts_in_words(others), *solids, *heading, *parts])
+
+
+def _solid(solid: reports.Report) -> str:
+    """Return the facts of one solid of several as text."""
+    return f"{solid['name']}, volume {solid['volume']:.6g}, {reports.patches_of_solid(solid)}"
 
 
 def _patch(part: reports.Report) -> str:

@@ -30,24 +30,25 @@ def face_labels() -> list[str]:
 
 
 def face_colors(body: BodyLike) -> list[str]:
-    """Return the colours of six faces of each patch: those of the faces of a volume; of several each patch has one."""
+    """Return the colours of six faces of each patch: of a volume one a face, otherwise one a patch, or one a solid."""
     glued = as_body(body)
     if glued.is_single:
         return list(FACE_COLORS)
-    return [PATCH_COLORS[i % len(PATCH_COLORS)] for i in range(len(glued)) for _ in FACE_NAMES]
+    owners = glued.solids.numbers.tolist() if glued.solids.are_several else range(len(glued))
+    return [PATCH_COLORS[i % len(PATCH_COLORS)] for i in owners for _ in FACE_NAMES]
 
 
 def color_labels(body: BodyLike) -> list[tuple[str, str]]:
     """Return the legend of the colours: each with a label such as "u0: u = 0", of several patches such as "p3, p23".
 
-    Very many patches have no legend.
+    Of several solids the labels are their names. Very many patches or solids have no legend.
     """
     glued = as_body(body)
     if glued.is_single:
         return list(zip(FACE_COLORS, face_labels(), strict=True))
-    if len(glued) > MOST_NAMED:
+    names = list(glued.solids.labels) if glued.solids.are_several else [f"p{i}" for i in range(len(glued))]
+    if len(names) > MOST_NAMED:
         return []
-    names = [f"p{i}" for i in range(len(glued))]
     alike = [names[i :: len(PATCH_COLORS)] for i in range(min(len(names), len(PATCH_COLORS)))]
     return [(color, ", ".join(each)) for color, each in zip(PATCH_COLORS, alike, strict=False)]
 

@@ -52,10 +52,13 @@ def write_mfem(path: Path, volume: BodyLike, solution: SplineField | None = None
     for patch, place, row in zip(body, places, own, strict=True):
         rows[place], weights[place] = patch.control_points, row
     _demand_one_weight([weights[place] for place in places], own)
+    owners = body.solids.numbers if body.solids.are_several else np.arange(len(body))
     boundary = [(6 * number + ATTRIBUTES.index(face) + 1, number, face) for number, face in body.outer_faces]
     sections = {
         "dimension": ["3"],
-        "elements": _counted(f"{p + 1} {CUBE} {_joined(row)}" for p, row in enumerate(layout.hexahedra)),
+        "elements": _counted(
+            f"{owner + 1} {CUBE} {_joined(row)}" for owner, row in zip(owners.tolist(), layout.hexahedra, strict=True)
+        ),
         "boundary": _counted(f"{a} {SQUARE} {_joined(layout.hexahedra[p, FACES[face]])}" for a, p, face in boundary),
         "edges": _counted(map(_joined, layout.edges)),
         "vertices": [str(layout.vertices)],

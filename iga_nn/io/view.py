@@ -5,7 +5,7 @@ The nodes of the hexahedra lie on the spline, some a span of the solution and di
 solution being known) `error` = |u - u_h|, and quantities of its law. Displacements are vectors `u`, and their `error`
 is a length. Symmetric tensors have six components, in VTK's order. Of a left-handed volume bottom and top of each cell
 change places. The cells of several patches are in one grid, a block of cells after the other, with the cell data
-`patch`: the number of each cell's patch.
+`patch`, the number of each cell's patch, and `solid`, that of its solid where there are several.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ from solve.solution import Solution
 
 from ..errors import InputError, one_line
 from ..figures.fields import OnGrid, arap_of, error_at, known_groups, problems_on
-from .vtk import bezier_cells, save
+from .vtk import bezier_cells, enter_owners, save
 
 if TYPE_CHECKING:
     import pyvista
@@ -208,7 +208,7 @@ def _ends(side: int) -> slice:
 def _joined(
     body: BodyLike, lattices: Sequence[_Lattice], kind: type[np.floating[Any]] = np.float64
 ) -> pyvista.UnstructuredGrid:
-    """Return the samples of all patches as one grid, of several with the number of each cell's patch."""
+    """Return the samples of all patches as one grid, with the numbers of each cell's patch and solid."""
     import pyvista
 
     cells, owners, start = [], [], 0
@@ -219,8 +219,7 @@ def _joined(
         start += lattice.points.size // 3
     points = np.concatenate([_flat(lattice.points) for lattice in lattices]).astype(kind)
     grid = pyvista.UnstructuredGrid({pyvista.CellType.HEXAHEDRON: np.concatenate(cells)}, points)
-    if not as_body(body).is_single:
-        grid.cell_data["patch"] = np.concatenate(owners)
+    enter_owners(grid, as_body(body), np.concatenate(owners))
     for name in lattices[0].fields:
         columns, components = _as_columns(np.concatenate([_flat(lattice.fields[name]) for lattice in lattices]))
         grid.point_data[name] = columns.astype(kind)

@@ -11,7 +11,8 @@ w reversed.
 
 The patches of a body are in one grid, not a block each: neighbours share the points of an interface where they have the
 same weights there, so that the surface is the body's and fields run on through it. The cell data `patch` is the number
-of a cell's patch, by which ParaView selects (Threshold) or colours.
+of a cell's patch, and `solid`, of a body of several solids, that of its solid: ParaView selects (Threshold) or colours
+by them.
 
 VTK's slices, clips and contours take the Bernstein coefficients of such cells for values and are wrong; surfaces and
 tessellations are right. For slicing and clipping there are the samples of `io.view`.
@@ -30,7 +31,7 @@ from scipy.sparse import csr_array
 
 from parameterize.arrays import Array, IntArray
 from parameterize.spline.bernstein import elevation, extraction
-from parameterize.spline.body import BodyLike, as_body, shared_numbers
+from parameterize.spline.body import Body, BodyLike, as_body, shared_numbers
 from parameterize.spline.bspline import (
     apply_along,
     evaluate_grid,
@@ -76,7 +77,7 @@ class _Exact:
 
 
 def bezier_cells(body: BodyLike, solution: FieldOnBody | None) -> pyvista.UnstructuredGrid:
-    """Return the cells of all patches; of several also the number of each cell's patch as the cell data `patch`.
+    """Return the cells of all patches, with the numbers that `enter_owners` enters.
 
     Neighbours share the points of their interface where these have the same weights, so that the surface of the grid is
     that of the body. Where the weights of two faces differ by a factor, each patch keeps points of its own.
@@ -99,12 +100,19 @@ def bezier_cells(body: BodyLike, solution: FieldOnBody | None) -> pyvista.Unstru
     grid.point_data.set_array(_entered(weights, labels, count), "RationalWeights")
     grid.GetCellData().SetActiveHigherOrderDegrees("HigherOrderDegrees")
     grid.GetPointData().SetActiveRationalWeights("RationalWeights")
-    if not body.is_single:
-        grid.cell_data["patch"] = np.repeat(np.arange(len(parts)), list(map(len, rows)))
+    enter_owners(grid, body, np.repeat(np.arange(len(parts)), list(map(len, rows))))
     if solution is not None:
         values = [part.values for part in parts if part.values is not None]
         grid.point_data["u"] = _entered(values, labels, count)
     return grid
+
+
+def enter_owners(grid: pyvista.UnstructuredGrid, body: Body, owners: IntArray) -> None:
+    """Enter the numbers of the cells' patches (cells,) and solids, where the body has several, as cell data."""
+    if not body.is_single:
+        grid.cell_data["patch"] = owners
+    if body.solids.are_several:
+        grid.cell_data["solid"] = body.solids.numbers[owners]
 
 
 def _entered(values: Sequence[Array], labels: Sequence[IntArray], count: int) -> Array:

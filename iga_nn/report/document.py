@@ -222,6 +222,11 @@ def volume_in_words(report: Report) -> tuple[str, ...]:
     return f"{volume['spline']:.6g}", beside
 
 
+def patches_of_solid(solid: Report) -> str:
+    """Return the number of patches of an entry of `solids` in words."""
+    return f"{solid['patches']:,} patch{'es' * (solid['patches'] > 1)}"
+
+
 def control_points_in_words(report: Report) -> str:
     """Return the number of control points of `auto`, and the reason why there are not more; "" for a given number."""
     if not (refinement := report["parameterization"].get("refinement")):

@@ -151,6 +151,10 @@ def _facts(report: Report) -> list[tuple[str, str, str]]:
     if volume := reports.volume_in_words(report):
         number, beside = volume
         facts.append(("Volume", number, beside))
+    facts += [
+        (f"Volume of {solid['name']}", f"{solid['volume']:.6g}", reports.patches_of_solid(solid))
+        for solid in quality.get("solids", ())
+    ]
     if levels := reports.solved(report).get("levels"):
         finest = levels[-1]
         facts += [_error_fact(finest, *keys) for keys in ERRORS if finest.get(keys[0]) is not None]

@@ -59,6 +59,7 @@ def _body(body: Body) -> str:
     net = all_control_points(body)
     facts = [
         ("patches", str(len(body))),
+        *([] if body.solids.is_plain else [("solids", body.solids.told)]),
         ("interfaces", str(len(body.interfaces))),
         ("outer faces", str(sum(map(len, body.outer)))),
         ("control points", f"{body.numbering[1]:,}"),

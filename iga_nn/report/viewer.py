@@ -246,12 +246,15 @@ def _cut(seen: Mask, outer: IntArray) -> dict[str, list[tuple[float, ...]]]:
 
 
 def _colors(body: BodyLike, outer: IntArray) -> dict[str, Any]:
-    """Return the colours and the names of the outer faces, and the legend of the colours."""
+    """Return the colours and the names of the outer faces, the legend of the colours, and each patch's solid."""
     colors, glued = np.reshape(face_colors(body), (-1, len(FACE_NAMES))), as_body(body)
     patches, faces = np.divmod(outer, PER_PATCH)
     pairs = zip(patches.tolist(), faces.tolist(), strict=True)
     named = face_labels() if glued.is_single else [glued.face_name(patch, FACE_NAMES[face]) for patch, face in pairs]
-    return {"colors": colors[patches, faces].tolist(), "labels": named, "legend": color_labels(body)}
+    found = {"colors": colors[patches, faces].tolist(), "labels": named, "legend": color_labels(body)}
+    if glued.solids.are_several:
+        found |= {"solids": glued.solids.numbers.tolist(), "solid_names": glued.solids.labels}
+    return found
 
 
 def _bound(frames: Sequence[Frame]) -> float:

@@ -360,9 +360,24 @@ def proved(body: Body, certificate: Certificate, check: BoundaryCheck) -> dict[s
         "outer_faces": sum(map(len, body.outer)),
         "euler_number": euler_number(body),
         "interfaces": [str(interface) for interface in body.interfaces],
+        **({} if body.solids.is_plain else {"solids": solids_of(body)}),
         **({"misglued": [str(interface) for interface in certificate.misglued]} if certificate.misglued else {}),
         "patches": [_of_patch(patch, own, {}) for patch, own in zip(body, certificate.patches, strict=True)],
     }
+
+
+def solids_of(body: Body) -> list[dict[str, Any]]:
+    """Return the name, the number of patches and the volume of each solid of a body."""
+    volumes, numbers = np.empty(len(body)), body.solids.numbers
+    for group in body.groups:
+        volumes[group.numbers] = np.abs(enclosed_volumes(group, group.control_points.mean(axis=(1, 2, 3))))
+    labels = body.solids.labels
+    counts = np.bincount(numbers, minlength=len(labels)).tolist()
+    sums = np.bincount(numbers, volumes, minlength=len(labels)).tolist()
+    return [
+        {"name": name, "patches": count, "volume": volume}
+        for name, count, volume in zip(labels, counts, sums, strict=True)
+    ]
 
 
 def _of_patch(patch: BSplineVolume, certificate: PatchCertificate, checked: Mapping[str, Any]) -> dict[str, Any]:

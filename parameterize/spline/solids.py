@@ -75,6 +75,11 @@ class PatchSolids(Brief):
         return tuple(named.get(number) or f"solid{number + 1}" for number in range(count))
 
     @property
+    def are_several(self) -> bool:
+        """Return whether the patches belong to more than one solid."""
+        return bool((self.numbers != self.numbers[:1]).any())
+
+    @property
     def of_patches(self) -> list[str]:
         """Return the name of each patch's solid."""
         return np.array(self.labels, dtype=object)[self.numbers].tolist()

@@ -56,6 +56,7 @@ function readings(scene, frame, patch, hit) {
   const found = [
     ["x, y, z", pointAt(scene, patch, hit).map(written).join(", ")],
     ...(scene.meshes.length > 1 ? [["patch", `p${patch.cube}`]] : []),
+    ...(scene.solids ? [["solid", scene.solid_names[scene.solids[patch.cube]]]] : []),
     ["u, v, w", AXES.map((axis) => mixed(patch.parameters, 3, corners, weights, axis).toFixed(3)).join(", ")],
   ];
   for (const field of scene.fields)
