@@ -11,7 +11,7 @@ import igl
 import numpy as np
 import pytest
 from example_files import EXAMPLES, cells, load
-from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox, BRepPrimAPI_MakeCylinder
+from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox, BRepPrimAPI_MakeCylinder, BRepPrimAPI_MakeSphere
 from OCP.STEPControl import STEPControl_AsIs, STEPControl_Writer
 
 import iga_nn
@@ -75,6 +75,11 @@ def test_the_distance_is_that_of_the_exact_face(tmp_path):
     assert part.distances(above) == pytest.approx([0.25, sqrt(2.0)], rel=1e-6)
     assert len(part.sharp_edges) == 2 and len(part.corners) == 0 and part.volume == pytest.approx(20 * pi)
     assert part.distances(part.surface_points(200, np.random.default_rng(0))).max() < 1e-9
+
+
+def test_a_ball_has_no_sharp_edge_at_its_poles(tmp_path):
+    part = brep.Brep.load(step(BRepPrimAPI_MakeSphere(2.0).Shape(), tmp_path / "ball.step"))
+    assert part.sharp_edges == [] and len(part.corners) == len(part.sharp_points) == 0
 
 
 def test_rows_say_why_there_is_no_map(tmp_path):

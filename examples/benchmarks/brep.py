@@ -1,6 +1,7 @@
 """The exact solids of a STEP file, by OpenCASCADE: points on faces and sharp edges, corners, distances, volume.
 
-All lengths are those of the file's unit.
+All lengths are those of the file's unit. Where the file has triangles instead of surfaces, these are the part, and it
+has no edges.
 """
 
 from __future__ import annotations
@@ -21,22 +22,24 @@ from OCP.BRepCheck import BRepCheck_Analyzer
 from OCP.BRepExtrema import BRepExtrema_DistShapeShape
 from OCP.BRepGProp import BRepGProp
 from OCP.BRepMesh import BRepMesh_IncrementalMesh
+from OCP.BRepTools import BRepTools
 from OCP.Extrema import Extrema_GenLocateExtPS
 from OCP.gp import gp_Pnt, gp_Pnt2d, gp_Vec
 from OCP.GProp import GProp_GProps
 from OCP.IFSelect import IFSelect_RetDone
 from OCP.IntTools import IntTools_FClass2d
 from OCP.STEPControl import STEPControl_Reader
-from OCP.TopAbs import TopAbs_EDGE, TopAbs_FACE, TopAbs_IN, TopAbs_REVERSED, TopAbs_SOLID
+from OCP.TopAbs import TopAbs_EDGE, TopAbs_FACE, TopAbs_IN, TopAbs_REVERSED
 from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS
 
 from parameterize.surface.readers.cad_units import step_unit
-from parameterize.surface.readers.opencascade import ShapeKey, compound, diagonal, parts
+from parameterize.surface.readers.opencascade import ShapeKey, bodies_of, compound, diagonal, parts
 
 SHARP = 20.0  # degrees between the normals of two faces
 FINENESS = 5e-5  # of the diagonal: deflection of the triangles that say which face is near
 ON_EDGE = 33  # points of a sharp edge
+POLE = 1e-6  # of the longest normal along an edge
 FARTHEST = 500  # points whose distance is confirmed by a search over the whole face
 VOLUME_ERROR = 1e-6  # relative, of the integral over a face
 
@@ -47,6 +50,7 @@ class Brep:
 
     solids: tuple[Any, ...]
     factor: float  # of the file's unit in that in which OpenCASCADE works
+    is_mesh: bool = False
 
     @classmethod
     def load(cls, path: Path) -> Brep:
@@ -56,10 +60,10 @@ class Brep:
             raise ValueError(f"{path}: cannot be read")
         reader.SetSystemLengthUnit(unit.working)
         reader.TransferRoots()
-        solids = tuple(parts(reader.OneShape(), TopAbs_SOLID).values())
+        solids, kind = bodies_of(reader.OneShape())
         if not solids:
             raise ValueError(f"{path}: no solid")
-        return cls(solids, unit.factor)
+        return cls(tuple(solids), unit.factor, kind == "mesh")
 
     @cached_property
     def whole(self) -> Any:
@@ -78,10 +82,11 @@ class Brep:
 
     @property
     def volume(self) -> float:
-        """Return the volume, by adaptive integration over the exact faces."""
+        """Return the volume, by adaptive integration over the exact faces, or that inside the triangles."""
         found = GProp_GProps()
-        BRepGProp.VolumeProperties_s(self.whole, found, VOLUME_ERROR)
-        return float(found.Mass()) / self.factor**3
+        given = (False, False, True) if self.is_mesh else (VOLUME_ERROR,)
+        BRepGProp.VolumeProperties_s(self.whole, found, *given)
+        return abs(float(found.Mass())) / self.factor**3
 
     @cached_property
     def faces(self) -> list[Any]:
@@ -90,8 +95,10 @@ class Brep:
 
     @cached_property
     def triangles(self) -> Triangles:
-        """Return triangles of all faces, with their vertices' parameters."""
-        BRepMesh_IncrementalMesh(self.whole, FINENESS * diagonal(self.whole), False, 0.2, False)
+        """Return triangles of all faces, with the parameters of their corners: fine ones of exact faces."""
+        if not self.is_mesh:
+            BRepTools.Clean_s(self.whole)  # of the triangles that the file has beside them
+            BRepMesh_IncrementalMesh(self.whole, FINENESS * diagonal(self.whole), False, 0.2, False)
         return Triangles.of(self.faces)
 
     def surface_points(self, count: int, rng: np.random.Generator) -> np.ndarray:
@@ -102,6 +109,8 @@ class Brep:
         weights = rng.dirichlet((1.0, 1.0, 1.0), len(spread))
         weights = np.concatenate([0.98 * weights + 0.02 / 3.0, np.full((len(each), 3), 1.0 / 3.0)])
         chosen = np.concatenate([spread, each])
+        if self.is_mesh:
+            return np.einsum("nk,nkx->nx", weights, self.triangles.points[chosen]) / self.factor
         parameters = np.einsum("nk,nkx->nx", weights, self.triangles.parameters[chosen])
         found = np.empty((len(chosen), 3))
         for face, rows in by_value(self.triangles.face[chosen]):
@@ -117,6 +126,8 @@ class Brep:
         The face is that of the nearest triangle. The foot is found by Newton's method from there. Where it is not
         inside the face's outline, and for the farthest points, the distance is that of the trimmed face.
         """
+        if self.is_mesh:
+            return self.mesh_distances(points)
         points = points * self.factor
         _, parameters, numbers = self.triangles.nearest(points)
         faces = {number: FaceDistance(self.faces[number]) for number in np.unique(numbers).tolist()}
@@ -134,7 +145,7 @@ class Brep:
     def sharp_edges(self) -> list[tuple[np.ndarray, np.ndarray]]:
         """Return points (ON_EDGE, 3) of each edge with a sharp place, and where (ON_EDGE,) the edge is sharp."""
         found = []
-        for solid in self.solids:
+        for solid in () if self.is_mesh else self.solids:
             for places, normals in _edges(solid):
                 cosine = np.clip((normals[0] * normals[1]).sum(axis=1), -1.0, 1.0)
                 sharp = np.degrees(np.arccos(cosine)) > SHARP
@@ -180,7 +191,8 @@ class Triangles:
             nodes = range(1, mesh.NbNodes() + 1)
             moved = (mesh.Node(k).Transformed(place.Transformation()) for k in nodes)
             own = np.array([(p.X(), p.Y(), p.Z()) for p in moved])
-            plane = np.array([(p.X(), p.Y()) for p in map(mesh.UVNode, nodes)])
+            on_plane = map(mesh.UVNode if mesh.HasUVNodes() else mesh.Node, nodes)
+            plane = np.array([(p.X(), p.Y()) for p in on_plane])
             corners = np.array([mesh.Triangle(k).Get() for k in range(1, mesh.NbTriangles() + 1)]) - 1
             points.append(own[corners])
             parameters.append(plane[corners])
@@ -263,7 +275,10 @@ def _normals(edge: Any, face: Any) -> np.ndarray:
         place = line.Value(t)
         surface.D1(place.X(), place.Y(), point, u, v)
         rows.append(np.cross((u.X(), u.Y(), u.Z()), (v.X(), v.Y(), v.Z())))
-    return (-1.0 if face.Orientation() == TopAbs_REVERSED else 1.0) * _unit(np.array(rows))
+    normals = np.array(rows)
+    lengths = np.linalg.norm(normals, axis=1)
+    normals[lengths < POLE * lengths.max()] = np.nan  # where the face has shrunk to a point
+    return (-1.0 if face.Orientation() == TopAbs_REVERSED else 1.0) * _unit(normals)
 
 
 def _unit(vectors: np.ndarray) -> np.ndarray:
@@ -273,6 +288,8 @@ def _unit(vectors: np.ndarray) -> np.ndarray:
 
 def corners_of(ends: np.ndarray, ways: np.ndarray, tolerance: float) -> np.ndarray:
     """Return where edges that end in points (n, 3) and leave them along (n, 3) meet, other than smoothly two by two."""
+    if not len(ends):
+        return ends
     _, first, group = np.unique(np.round(ends / tolerance), axis=0, return_index=True, return_inverse=True)
     found = []
     for number, rows in by_value(group.ravel()):
