@@ -62,6 +62,8 @@ def test_bodies_that_touch_in_equal_triangles_are_glued():
     surface = surface_from_arrays(*joined(cube((0, 0, 0)), cube((0, 0, 1))), groups={"lower": np.arange(12)})
     assert surface.volume == pytest.approx(2.0) and (surface.shells, len(surface.faces)) == (1, 20)
     assert surface.solids == ("lower", "") and np.bincount(surface.owners).tolist() == [10, 10]
+    assert np.array_equal(surface.groups["solid2"], np.flatnonzero(surface.owners == 1))
+    assert np.array_equal(surface.groups["lower"], np.flatnonzero(surface.owners == 0))  # group:lower is its boundary
     assert np.all(surface.walls.corners[..., 2] == 1.0) and surface.walls.solids.tolist() == [[0, 1], [0, 1]]
     assert "glued solids over an area of 1, 2 faces" in surface.notices
 

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..arrays import IntArray
+from ..spline.solids import PatchSolids
 from .errors import MeshError
 
 Groups = Mapping[str, IntArray]  # name: numbers of faces, ascending
@@ -57,6 +58,16 @@ def renumbered(groups: Groups, old: IntArray) -> dict[str, IntArray]:
         member[numbers] = True
         found[name] = np.flatnonzero(member[old])
     return {name: numbers for name, numbers in found.items() if len(numbers)}
+
+
+def of_solids(names: tuple[str, ...], owners: IntArray) -> dict[str, IntArray]:
+    """Return a group for each name of several solids, which `PatchSolids.labels` gives.
+
+    owners: (m,), the solid of each face.
+    """
+    if len(names) < 2:
+        return {}
+    return gathered((name, np.flatnonzero(owners == k)) for k, name in enumerate(PatchSolids(owners, names).labels))
 
 
 def checked(groups: Mapping[str, ArrayLike], count: int) -> dict[str, IntArray]:

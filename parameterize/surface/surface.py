@@ -25,7 +25,7 @@ from .errors import (
 from .features import SHARP, Features, features_of
 from .geometry import signed_volume
 from .gluing import NO_WALLS, Walls
-from .groups import Groups, checked, renumbered
+from .groups import Groups, checked, of_solids, renumbered
 from .holes import Close
 from .mending import Asked, mend, without_defects
 from .part import PartSurface
@@ -78,7 +78,8 @@ class Surface(Brief, Shown):
         Pairs of faces that intersect.
     groups : dict of str to array of int
         The faces of each group of the input, ascending: OBJ groups, materials and objects, STL solids, physical groups
-        of Gmsh, whole numbers given with faces. A face may be in several.
+        of Gmsh, whole numbers given with faces; and the outer faces of each of several solids, by its name, or
+        "solid2". A face may be in several.
     unit : str
         Of lengths, where the file has one, such as mm.
     sharp : float
@@ -393,7 +394,7 @@ def _gate(raw: RawMesh, name: str, source: str, asked: Asked) -> Surface:
         center=deepest * repaired.size + repaired.middle,
         unit_vertices=placed.astype(np.float32).astype(np.float64),
         crossings=crossings,
-        groups=renumbered(raw.groups, repaired.old),
+        groups=of_solids(solids.names, solids.owners) | renumbered(raw.groups, repaired.old),
         unit=raw.unit,
         brep=exact.text,
         brep_faces=exact.faces[: len(triangles)],
