@@ -95,3 +95,25 @@ def test_shares_of_a_surface_are_those_of_its_area():
     corner = share_of(Region("x + y + z < 1e-6"), cube)
     assert 0.0 < corner < 1e-4
     check_regions(Elasticity(fix="u0", load={"z > 0.9": (0, 0, 1)}), cube)  # of the cube's faces nothing is known yet
+
+
+@pytest.mark.parametrize(
+    ("options", "says"),
+    [
+        (["elasticity", "--young", "steel: 1, pad: 2"], "young: there is no solid 'pad'; the body has steel, solid2"),
+        (["elasticity", "--young", "steel: 1"], "young has no entry for solid 'solid2'; the body has steel, solid2"),
+        (["poisson", "--kappa", "steel: 1, solid2: z-1.5", "--source", "1"], "kappa must be positive, and is not at x=0, y=0, z=1"),
+        (["poisson", "--source", "steel: 1, solid2: 1/(z-2)"], "source of solid2 is not finite"),
+    ],
+)
+def test_data_of_solids_are_refused_before_the_map_is_made(options, says, in_folder, capsys):
+    """A cube upon a cube: the lower one has a name."""
+    corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], dtype=float)
+    quads = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
+    triangles = [triangle for a, b, c, d in quads for triangle in ([a, b, c], [a, c, d])]
+    lines = [f"v {x} {y} {z + up}" for up in (0, 1) for x, y, z in corners]
+    faces = [[f"f {a + 8 * up + 1} {b + 8 * up + 1} {c + 8 * up + 1}" for a, b, c in triangles] for up in (0, 1)]
+    (in_folder / "two.obj").write_text("\n".join([*lines, "g steel", *faces[0], "g", *faces[1], ""]))
+    held = ["--fix", "nz < -0.9", "--body-force", "0;0;-1"] if options[0] == "elasticity" else ["--boundary", "0"]
+    assert main(["run", options[0], "two.obj", *options[1:], *held, "--out", "out"]) == 2
+    assert says in capsys.readouterr().err

@@ -18,6 +18,7 @@ from parameterize.compilation import compilation_told
 from parameterize.files import array_names, load_arrays, save_arrays
 from parameterize.progress import ProgressCallback
 from parameterize.spline.body import BodyLike, as_body
+from parameterize.spline.solids import PatchSolids
 from parameterize.spline.volume import FACE_NAMES
 from parameterize.surface.geometry import vertex_normals
 from parameterize.surface.surface import Surface
@@ -25,6 +26,7 @@ from solve import ExpressionError
 from solve.diagnostics import empty_formulas
 from solve.forms.boundary_value_problem import BoundaryValueProblem
 from solve.forms.frame import UnitFrame
+from solve.forms.owners import demand_owners
 
 from ..errors import InputError, input_errors
 from ..io.formats import load_volume
@@ -241,13 +243,19 @@ def read_corners(path: Path, frame: UnitFrame | None = None) -> Array | IntArray
 
 
 def _check_data(problem: BoundaryValueProblem, surface: Surface) -> None:
-    """Check the problem's data on the surface, because no points inside are known yet. Raises ExpressionError."""
+    """Check the problem's data on the surface, because no points inside are known yet.
+
+    Raises ExpressionError, and InputError for names of solids that are not those of the surface.
+    """
     problem = problem.placed(frame_of(surface))
     points = surface.vertices.T
-    if problem.exact is not None:
-        problem.exact_at(points)
-    for evaluate in (problem.source_at, problem.form.tensor, problem.form.mass):
-        evaluate(points)
+    with input_errors():
+        parts = _of_solids(problem, surface)
+    for own, inside in parts:
+        if own.exact is not None:
+            own.exact_at(inside)
+        for evaluate in (own.source_at, own.form.tensor, own.form.mass):
+            evaluate(inside)
     for _, notice in empty_formulas(problem, points):
         log.warning("%s", notice)
     normals = vertex_normals(surface.vertices, surface.faces)
@@ -260,6 +268,25 @@ def _check_data(problem: BoundaryValueProblem, surface: Surface) -> None:
             problem.boundary_at(points, face)
         else:
             _check_somewhere(partial(problem.on_face, face), surface.vertices, normals)
+
+
+def _of_solids(problem: BoundaryValueProblem, surface: Surface) -> list[tuple[BoundaryValueProblem, Array]]:
+    """Return the problem of each solid of a surface with the solid's vertices (3, m); none of data by patch.
+
+    Patches have numbers once the map exists. Raises ValueError for names of solids that are not those of the surface.
+    """
+    if not problem.by_patch:
+        return [(problem, surface.vertices.T)]
+    if not all(isinstance(owner, str) for owners in problem.by_patch.values() for owner in owners):
+        return []
+    names = surface.solids if len(surface.solids) > 1 else ()  # the map of one solid does not keep its name
+    solids = PatchSolids.of(PatchSolids(surface.owners, names), len(surface.faces))
+    for name, owners in problem.by_patch.items():
+        demand_owners(name, owners, solids)
+    rows = [np.unique(surface.faces[solids.numbers == number]) for number in range(len(solids.labels))]
+    return [
+        (problem.of_patch(0, label), surface.vertices[row].T) for label, row in zip(solids.labels, rows, strict=True)
+    ]
 
 
 def _check_somewhere(evaluate: Callable[[Array, Array], object], points: Array, normals: Array) -> None:
