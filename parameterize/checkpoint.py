@@ -17,7 +17,7 @@ from safetensors.numpy import save as to_bytes
 
 from .files import save_bytes
 
-FORMAT = 11  # a file of another one is refused by name
+FORMAT = 12  # a file of another one is refused by name
 KEPT = {  # the checkpoints of a run by their names, in the order of its stages, and what they hold
     "choice": "the way that the body takes",
     "first": "the blocks that are laid",

@@ -18,7 +18,16 @@ PresetName = Literal["fast", "grown", "paper"]
 Device = Literal["auto", "cpu", "cuda"]  # where the network is trained; "auto" takes CUDA where it is available
 # The ways as the command line writes them; `ways/strategy.py` says which body takes which.
 WayName = Literal[
-    "planes", "stacks", "body-with-stubs", "blocks", "sharp-edges", "network", "growth", "stiff-growth", "last-growth"
+    "planes",
+    "stacks",
+    "hexahedra",
+    "body-with-stubs",
+    "blocks",
+    "sharp-edges",
+    "network",
+    "growth",
+    "stiff-growth",
+    "last-growth",
 ]
 
 

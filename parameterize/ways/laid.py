@@ -3,7 +3,6 @@
 from abc import abstractmethod
 from collections import Counter
 from collections.abc import Callable
-from dataclasses import asdict
 from typing import Any, ClassVar
 
 import numpy as np
@@ -17,7 +16,7 @@ from ..optimization.surface_distance import Correspondence
 from ..optimization.term import Weights
 from ..progress import timed
 from ..quality.distances import nearest_on_boundary
-from ..spline.interface import Interface
+from ..spline.interface_rows import interfaces_of, rows_of
 from ..spline.sampled_boundary import SampledBoundary
 from ..spline.solids import PatchSolids
 from ..spline.spline_map import ControlNets, SplineMap
@@ -87,9 +86,9 @@ def kept_blocks(checkpoints: Checkpoints, lay: Callable[[], SplineMap]) -> Splin
         "knots": np.concatenate([row for knots in nets.knots for row in knots]),
         "lengths": np.array([[len(row) for row in knots] for knots in nets.knots]),
         "solids": nets.solids.numbers,
+        "interfaces": rows_of(nets.interfaces),
     }
-    interfaces = [asdict(one) for one in nets.interfaces]
-    state = {"degree": nets.degree, "interfaces": interfaces, "solid_names": nets.solids.names}
+    state = {"degree": nets.degree, "solid_names": nets.solids.names}
     checkpoints.save(_CHECKPOINT, arrays, state)
     return first
 
@@ -99,14 +98,7 @@ def _loaded(arrays: dict[str, NDArray[Any]], state: dict[str, Any]) -> SplineMap
     lengths = arrays["lengths"]
     rows = np.split(arrays["knots"], np.cumsum(lengths.ravel())[:-1])
     knots = tuple((rows[k], rows[k + 1], rows[k + 2]) for k in range(0, len(rows), 3))
-    interfaces = tuple(_interface(**values) for values in state["interfaces"])
-    solids = PatchSolids(arrays["solids"], tuple(state["solid_names"])) if "solids" in arrays else PatchSolids()
-    return SplineMap(ControlNets(state["degree"], knots, interfaces, solids), arrays["control"])
+    solids = PatchSolids(arrays["solids"], tuple(state["solid_names"]))
+    nets = ControlNets(state["degree"], knots, interfaces_of(arrays["interfaces"]), solids)
+    return SplineMap(nets, arrays["control"])
 
-
-def _interface(first: list[Any], second: list[Any], swapped: bool, flipped: list[bool]) -> Interface:
-    """Return an interface from the values of its fields as JSON has them."""
-    p, face_p = first
-    q, face_q = second
-    a, b = flipped
-    return Interface((p, face_p), (q, face_q), swapped, (a, b))

@@ -4,6 +4,7 @@
 | --- | --- | --- |
 | planes | bodies whose plane faces divide them into blocks | exact blocks, left as they are laid |
 | stacks | stacks of extrusions, also with leaning sides | blocks over their profiles, left as they are laid |
+| hexahedra | parts with sharp edges, cavities or several solids | four curved hexahedra of each tetrahedron, left as they are laid |
 | body with stubs | fat bodies with thin handles, such as a mug | one cube, cut into blocks, and rods on its faces |
 | blocks | all others with handles, and bodies of long limbs that meet | rods and junctions, drawn to the surface |
 | sharp edges | bodies without handles whose sharp edges one cube's can carry | one cube, laid along them |
@@ -24,6 +25,7 @@ from ..threads import one_blas_thread
 from .blocks import BLOCKS
 from .cost import Cost
 from .growth import GROWTH, LAST, STIFF
+from .hexahedra import HEXAHEDRA
 from .mapping_task import MappingTask
 from .network import NETWORK
 from .planes import PLANES
@@ -35,7 +37,7 @@ from .way import Suits, Way
 
 _log = logging.getLogger(__name__)
 
-WAYS: tuple[Way, ...] = (PLANES, STACKS, STUBS, BLOCKS, SHARP, NETWORK, GROWTH, STIFF, LAST)
+WAYS: tuple[Way, ...] = (PLANES, STACKS, HEXAHEDRA, STUBS, BLOCKS, SHARP, NETWORK, GROWTH, STIFF, LAST)
 _CHECKPOINT = "choice"
 
 

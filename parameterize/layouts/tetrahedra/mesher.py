@@ -1,0 +1,69 @@
+"""Makes the tetrahedra of a part by Netgen, in a process of its own, which has limits and may crash."""
+
+import json
+import subprocess
+import sys
+import tempfile
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from ...arrays import Array
+from .mesh import TetrahedralMesh
+
+PROGRAM = Path(__file__).with_name("netgen_program.py")
+PATIENCE = 120.0  # seconds
+
+
+class MesherError(Exception):
+    """The mesher makes no tetrahedra of a part; the message says why."""
+
+
+@dataclass(frozen=True)
+class Sizes:
+    """Say how long the edges of tetrahedra may be.
+
+    largest: in the part's unit. around: edges around a full circle. growth: how fast edges may grow, 0.1 to 1.
+    places: (k, 4) points with the largest edge there.
+    """
+
+    largest: float
+    around: float
+    growth: float = 0.7
+    places: Array = field(default_factory=lambda: np.empty((0, 4)))
+
+
+def tetrahedra_of_brep(text: bytes, sizes: Sizes) -> TetrahedralMesh:
+    """Return the tetrahedra of the solids of a B-rep, a text in the BREP format. Raises MesherError."""
+    with tempfile.TemporaryDirectory() as folder:
+        source, target, places = Path(folder, "part.brep"), Path(folder, "mesh.npz"), Path(folder, "places")
+        source.write_bytes(text)
+        rows = "\n".join(" ".join(map(repr, row)) for row in sizes.places.tolist())
+        places.write_text(f"{len(sizes.places)}\n{rows}\n0\n")
+        options = {"largest": sizes.largest, "around": sizes.around, "growth": sizes.growth, "places": str(places)}
+        run_netgen([str(PROGRAM), str(source), str(target), json.dumps(options)])
+        if not target.exists():
+            raise MesherError("Netgen ended without tetrahedra")
+        with np.load(target) as arrays:
+            mesh = TetrahedralMesh(**arrays)
+    if not len(mesh.cells) or mesh.volumes.min() <= 0.0:
+        raise MesherError("Netgen made flat tetrahedra")
+    return mesh
+
+
+def run_netgen(command: list[str]) -> None:
+    """Run a program that imports Netgen. Raises MesherError where it fails, or takes too long."""
+    try:
+        ended = subprocess.run(
+            [sys.executable, "-P", *command],
+            capture_output=True,
+            timeout=PATIENCE,
+            check=False,
+            stdin=subprocess.DEVNULL,
+        )
+    except subprocess.TimeoutExpired:
+        raise MesherError(f"Netgen takes more than {PATIENCE:.0f} s") from None
+    if ended.returncode:
+        said = ended.stderr.decode(errors="replace").strip().splitlines()
+        raise MesherError(f"Netgen fails ({''.join(said[-1:])[:120] or f'it ended with {ended.returncode}'})")
