@@ -174,7 +174,9 @@ def test_ways_are_taken_by_themselves_or_by_their_names():
     assert ways_of(()) == ()
     assert ways_of((GROWTH, "planes", "body-with-stubs")) == (GROWTH, PLANES, STUBS)
     assert ways_of("body with stubs") == ways_of(STUBS) == ways_of(("body-with-stubs", STUBS)) == (STUBS,)
-    with pytest.raises(ValueError, match="unknown way 'planks': choose from planes, stacks, body-with-stubs, "):
+    with pytest.raises(
+        ValueError, match="unknown way 'planks': choose from planes, stacks, hexahedra, body-with-stubs, "
+    ):
         ways_of("planks")
 
 

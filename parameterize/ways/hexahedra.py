@@ -4,6 +4,7 @@ import numpy as np
 
 from ..layouts.tetrahedra.curving import CurvedMesh
 from ..layouts.tetrahedra.hexahedra import PARTS, spline_of_tetrahedra
+from ..layouts.tetrahedra.mesh import TetrahedralMesh
 from ..layouts.tetrahedra.mesher import MesherError, Sizes, tetrahedra_of_brep
 from ..layouts.tetrahedra.part_mesh import curved_tetrahedra
 from ..optimization.endings import Reason
@@ -33,7 +34,7 @@ class HexahedraOfTetrahedra(Laid):
         """Return the map of the hexahedra at volume 1."""
         found = _tetrahedra(task)
         assert isinstance(found, CurvedMesh), "the way suits the body"
-        spline = spline_of_tetrahedra(found, task.config.spline.degree)
+        spline = spline_of_tetrahedra(found, task.config.spline.degree, task.surface.solids)
         return spline.with_control(np.ascontiguousarray(task.surface.to_unit(spline.control.T).T))
 
 
@@ -52,7 +53,7 @@ def _tetrahedra(task: MappingTask) -> CurvedMesh | str:
     if task.given_corners is not None or most is not None or not surface.brep:
         return ""
 
-    def mesher(sizes: Sizes):
+    def mesher(sizes: Sizes) -> TetrahedralMesh:
         return tetrahedra_of_brep(surface.brep, sizes)
 
     def find() -> CurvedMesh | str:

@@ -101,4 +101,3 @@ def _loaded(arrays: dict[str, NDArray[Any]], state: dict[str, Any]) -> SplineMap
     solids = PatchSolids(arrays["solids"], tuple(state["solid_names"]))
     nets = ControlNets(state["degree"], knots, interfaces_of(arrays["interfaces"]), solids)
     return SplineMap(nets, arrays["control"])
-

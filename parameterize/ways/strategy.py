@@ -4,7 +4,7 @@
 | --- | --- | --- |
 | planes | bodies whose plane faces divide them into blocks | exact blocks, left as they are laid |
 | stacks | stacks of extrusions, also with leaning sides | blocks over their profiles, left as they are laid |
-| hexahedra | parts with sharp edges, cavities or several solids | four curved hexahedra of each tetrahedron, left as they are laid |
+| hexahedra | all other parts with sharp edges, cavities or several solids | hexahedra of curved tetrahedra, as laid |
 | body with stubs | fat bodies with thin handles, such as a mug | one cube, cut into blocks, and rods on its faces |
 | blocks | all others with handles, and bodies of long limbs that meet | rods and junctions, drawn to the surface |
 | sharp edges | bodies without handles whose sharp edges one cube's can carry | one cube, laid along them |

@@ -1,7 +1,7 @@
 """Curves straight tetrahedra onto the part, as far as det J stays positive.
 
 The nodes on the part go to their places there. Inner nodes near tetrahedra that are not proved move (smoothing.py),
-inner edges are split (splitting.py), and what is still not proved steps back towards its straight shape, level by level.
+inner edges are split (splitting.py). What is still not proved steps back towards its straight shape, level by level.
 """
 
 from dataclasses import dataclass, replace

@@ -21,7 +21,8 @@ def indices(degree: int) -> IntArray:
 @cache
 def _multinomials(degree: int) -> Array:
     """Return the factors (n,) of the Bernstein polynomials of a degree."""
-    return np.array([factorial(degree) / prod(map(factorial, row)) for row in indices(degree).tolist()])
+    rows = indices(degree).tolist()
+    return np.array([float(factorial(degree) // prod(map(factorial, row))) for row in rows])
 
 
 @cache
@@ -33,7 +34,7 @@ def _places(degree: int) -> dict[tuple[int, ...], int]:
 @cache
 def bernstein_of_nodes() -> Array:
     """Return the matrix (20, 20) that makes Bernstein coefficients of values at the cubic nodes."""
-    return np.linalg.inv(bernstein_values(THIRDS / ORDER, ORDER))
+    return np.asarray(np.linalg.inv(bernstein_values(THIRDS / ORDER, ORDER)), dtype=np.float64)
 
 
 def bernstein_values(weights: Array, degree: int) -> Array:

@@ -1,4 +1,4 @@
-"""Four hexahedra of each curved tetrahedron, as one-span patches: a vertex, the middles of its edges and faces, its centre.
+"""Makes four hexahedra of each curved tetrahedron: each has a vertex, middles of edges and faces, and the centre.
 
 The barycentric coordinates are trilinear in the parameters of a hexahedron, and the tetrahedron is cubic in these: a
 patch of degree 3 or more is exactly a part of it. One of degree 2 agrees with it at its Greville points.
@@ -76,7 +76,7 @@ def _places() -> IntArray:
 
 @cache
 def control_points_of_nodes(degree: int) -> Array:
-    """Return the matrix (4, (degree + 1)^3, 20) from the cubic nodes of a tetrahedron to its patches' control points."""
+    """Return the matrix (4, (degree + 1)^3, 20) from a tetrahedron's cubic nodes to its patches' control points."""
     knots = open_uniform_knots(degree + 1, degree)
     share = greville(knots, degree)
     ends = np.stack([1.0 - share, share])

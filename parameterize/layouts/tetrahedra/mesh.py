@@ -139,5 +139,7 @@ def volumes_of(corners: Array) -> Array:
 def rows_in(table: IntArray, rows: IntArray) -> IntArray:
     """Return where rows (n, k) stand in a table (m, k) of rows in ascending order, which holds all of them."""
     base = int(table.max()) + 1
-    keys, wanted = (sum(part[:, k] * base ** (part.shape[1] - 1 - k) for k in range(part.shape[1])) for part in (table, rows))
+    keys, wanted = (
+        sum(part[:, k] * base ** (part.shape[1] - 1 - k) for k in range(part.shape[1])) for part in (table, rows)
+    )
     return np.searchsorted(keys, wanted)
