@@ -102,7 +102,10 @@ def test_shares_of_a_surface_are_those_of_its_area():
     [
         (["elasticity", "--young", "steel: 1, pad: 2"], "young: there is no solid 'pad'; the body has steel, solid2"),
         (["elasticity", "--young", "steel: 1"], "young has no entry for solid 'solid2'; the body has steel, solid2"),
-        (["poisson", "--kappa", "steel: 1, solid2: z-1.5", "--source", "1"], "kappa must be positive, and is not at x=0, y=0, z=1"),
+        (
+            ["poisson", "--kappa", "steel: 1, solid2: z-1.5", "--source", "1"],
+            "kappa must be positive, and is not at x=0, y=0, z=1",
+        ),
         (["poisson", "--source", "steel: 1, solid2: 1/(z-2)"], "source of solid2 is not finite"),
     ],
 )
