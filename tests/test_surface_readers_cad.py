@@ -267,7 +267,14 @@ def test_faces_that_are_no_solid_are_sewn(part, tmp_path):
     step = Step()
     halves = [step.shell(BOX * (1, 2, 3), sides, "OPEN") for sides in (SIDES[:3], SIDES[3:])]
     step.part(step.surfaces(*halves), kind="MANIFOLD_SURFACE_SHAPE_REPRESENTATION")
-    assert read(tmp_path, step.data()).volume == pytest.approx(6.0)
+    surface = read(tmp_path, step.data())
+    assert surface.volume == pytest.approx(6.0)
+    assert surface.brep.count(b"\nSo\n") == 1 and np.unique(surface.brep_faces).tolist() == [1, 2, 3, 4, 5, 6]
+
+
+def test_solids_that_nearly_touch_are_glued(part, tmp_path):
+    surface = read(tmp_path, of(box(), box(low=(1.0 + 1e-6, 0, 0))))
+    assert surface.shells == 1 and len(surface.walls.corners) == 2
 
 
 BODIES = {

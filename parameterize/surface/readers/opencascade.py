@@ -18,9 +18,10 @@ from OCP.Bnd import Bnd_Box
 from OCP.BOPAlgo import BOPAlgo_Builder
 from OCP.BRep import BRep_Builder, BRep_Tool
 from OCP.BRepBndLib import BRepBndLib
-from OCP.BRepBuilderAPI import BRepBuilderAPI_Sewing, BRepBuilderAPI_Transform
+from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeSolid, BRepBuilderAPI_Sewing, BRepBuilderAPI_Transform
 from OCP.BRepCheck import BRepCheck_Analyzer
 from OCP.BRepGProp import BRepGProp
+from OCP.BRepLib import BRepLib
 from OCP.BRepMesh import BRepMesh_IncrementalMesh
 from OCP.BRepTools import BRepTools
 from OCP.gp import gp_Pnt, gp_Trsf
@@ -44,6 +45,7 @@ from OCP.TopAbs import (
     TopAbs_FACE,
     TopAbs_REVERSED,
     TopAbs_SHAPE,
+    TopAbs_SHELL,
     TopAbs_SOLID,
     TopAbs_VERTEX,
 )
@@ -52,6 +54,7 @@ from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS, TopoDS_Compound, TopoDS_Iterator
 from OCP.TopTools import TopTools_FormatVersion
 
+CLOSE = 1e-6  # of the box's diagonal: solids that are as close touch
 SEWN = 1e-5  # of the box's diagonal: gaps between the faces of a model without solids that are sewn
 LEAST = 1e-6  # of its unit: its tolerance is a tenth of that, and smaller deflections are refused
 NO_AREA = 1e-10  # of the square of the diagonal: a face that needs no triangles, as its neighbours meet over it
@@ -171,6 +174,16 @@ def sewn(whole: Any) -> Any:
     return sewing.SewedShape()
 
 
+def filled(shape: Any) -> Any:
+    """Return the solid inside the faces of a shape, if they are one closed shell, else the shape."""
+    shells = [TopoDS.Shell(shell) for shell in parts(shape, TopAbs_SHELL).values()]
+    if len(shells) != 1 or not BRep_Tool.IsClosed_s(shells[0]) or parts(shape, TopAbs_FACE, TopAbs_SHELL):
+        return shape
+    solid = BRepBuilderAPI_MakeSolid(shells[0]).Solid()
+    BRepLib.OrientClosedSolid_s(solid)
+    return solid
+
+
 def bodies_of(shape: Any) -> tuple[list[Any], str]:
     """Return the solids of a shape and "solid"; those that are meshes and "mesh"; else its faces, sewn, and "faces"."""
     solids = list(parts(shape, TopAbs_SOLID).values())
@@ -178,7 +191,7 @@ def bodies_of(shape: Any) -> tuple[list[Any], str]:
     if solids:
         return exact or solids, "solid" if exact else "mesh"
     faces = [face for face in parts(shape, TopAbs_FACE).values() if not is_mesh(face)]
-    return [sewn(compound(faces))] if faces else [], "faces"
+    return [filled(sewn(compound(faces)))] if faces else [], "faces"
 
 
 @dataclass(frozen=True, eq=False)
@@ -217,6 +230,7 @@ def glued(bodies: list[Any]) -> Bodies:
     for body in bodies:
         fuse.AddArgument(body)
     fuse.SetNonDestructive(True)
+    fuse.SetFuzzyValue(CLOSE * diagonal(compound(bodies)))
     fuse.Perform()
     if fuse.HasErrors():
         return as_given(bodies, failed=True)
@@ -354,8 +368,8 @@ def main(
         "failed": found.failed,
         "changed": kind == "step" and any(map(is_changed, placements(reader.StepModel()))),
     }
-    together = compound(parts(compound(found.shapes), TopAbs_SOLID).values())
-    shapes = [together, *bodies] if what == "solid" else []
+    solids = parts(compound(found.shapes), TopAbs_SOLID).values() if what != "mesh" else []
+    shapes = [compound(solids), *bodies] if solids else []
     breps = {f"brep{k}": brep(shape, float(factor)) for k, shape in enumerate(shapes)}
     np.savez(target, facts=np.array(json.dumps(facts)), **arrays, **breps)
 
