@@ -9,14 +9,15 @@ there. The other way round F comes closer evenly: each sample of its boundary is
 surface that faces the same way.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 from scipy.spatial import cKDTree
 
 from ..arrays import Array, IntArray
 from ..spline.bspline import divided_spans
-from ..spline.orientation import face_vectors
+from ..spline.orientation import FACES, face_vectors
+from ..spline.patch_groups import PatchGroup, groups_of
 from ..spline.spline_map import SplineMap
 from .sliding import SlidingParameters
 from .surface_distance import TANGENTIAL, Correspondence
@@ -69,20 +70,35 @@ class BoundarySamples:
 
 def boundary_samples(spline: SplineMap, a_span: int) -> BoundarySamples:
     """Sample all faces of the boundary, `a_span` times a direction in each span."""
-    found = []
-    for face in np.flatnonzero(spline.nets.exposed):
-        block, inside = divmod(int(face), 6)
-        axis, side = divmod(inside, 2)
-        patch = spline.patch(block)
-        ends = [divided_spans(row, a_span) for row in patch.knots]
-        rows = [(row[1:] + row[:-1]) / 2.0 for row in ends]
-        points, normals = (vectors.reshape(3, -1).T for vectors in face_vectors(patch, rows, axis, side))
-        rows[axis] = np.array([float(side)])
-        parameters = np.stack(np.meshgrid(*rows, indexing="ij"), axis=-1).reshape(-1, 3)
-        lengths = np.linalg.norm(normals, axis=1)
-        unit = normals / np.maximum(lengths, 1e-300)[:, None]
-        found.append((parameters, np.full(len(points), face), points, unit, lengths / len(points)))
-    return BoundarySamples(*(np.concatenate(parts) for parts in zip(*found, strict=True)))
+    exposed = spline.nets.exposed.reshape(-1, len(FACES))
+    found = [
+        _face_samples(group.rows(exposed[group.numbers, face]), face, a_span)
+        for group in groups_of([spline.patch(block) for block in range(len(exposed))])
+        for face in range(len(FACES))
+        if exposed[group.numbers, face].any()
+    ]
+    faces = np.concatenate([samples.faces for samples in found])
+    order = np.argsort(faces, kind="stable")
+    names = [one.name for one in fields(BoundarySamples)]
+    return BoundarySamples(*(np.concatenate([getattr(one, name) for one in found])[order] for name in names))
+
+
+def _face_samples(group: PatchGroup, face: int, a_span: int) -> BoundarySamples:
+    """Sample one face of all patches of a group."""
+    axis, side = FACES[face]
+    ends = [divided_spans(row, a_span) for row in group.knots]
+    rows = [(row[1:] + row[:-1]) / 2.0 for row in ends]
+    points, normals = (np.moveaxis(vectors, 0, -1).reshape(-1, 3) for vectors in face_vectors(group, rows, axis, side))
+    rows[axis] = np.array([float(side)])
+    parameters = np.stack(np.meshgrid(*rows, indexing="ij"), axis=-1).reshape(-1, 3)
+    lengths = np.linalg.norm(normals, axis=1)
+    return BoundarySamples(
+        np.tile(parameters, (len(group), 1)),
+        np.repeat(len(FACES) * group.numbers + face, len(parameters)),
+        points,
+        normals / np.maximum(lengths, 1e-300)[:, None],
+        lengths / len(parameters),
+    )
 
 
 _DRAWN_A_SPAN = 2  # samples a direction and span

@@ -12,7 +12,7 @@ from ..spline.spline_map import SplineMap
 from ..threads import one_blas_thread
 from .laid import Laid, in_words
 from .mapping_task import MappingTask
-from .way import Suits
+from .way import Attempt, Suits, Way
 
 
 class HexahedraOfTetrahedra(Laid):
@@ -36,6 +36,10 @@ class HexahedraOfTetrahedra(Laid):
         assert isinstance(found, CurvedMesh), "the way suits the body"
         spline = spline_of_tetrahedra(found, task.config.spline.degree, task.surface.solids)
         return spline.with_control(np.ascontiguousarray(task.surface.to_unit(spline.control.T).T))
+
+    def serves(self, attempt: Attempt) -> bool:
+        """Return whether the map has no faults: proved hexahedra may still meet each other where walls are thin."""
+        return Way.serves(self, attempt)
 
 
 HEXAHEDRA = HexahedraOfTetrahedra("hexahedra", "curving the hexahedra of tetrahedra onto the part")
