@@ -145,11 +145,10 @@ def _check_laws(patches: Sequence[Stated]) -> bool:
 
 
 def _in_volumes(patches: Sequence[Stated]) -> list[Hashable]:
-    """Return what the law and the source of each patch are made of; a user's law is known by its object."""
+    """Return what the law and the source of each patch are made of."""
     if len(patches) == 1:
         return [None]
-    problems = [patch.problem for patch in patches]
-    return [(one.in_volume, id(one.form) if isinstance(one, Problem) else type(one.form).__name__) for one in problems]
+    return [(patch.problem.in_volume, type(patch.problem.form).__name__) for patch in patches]
 
 
 def assemble_data(

@@ -108,3 +108,36 @@ def test_capacities_of_solids(scheme):
         iga_nn.march(two_patches(), warmed, {"steel": "1", "wood": "1"}, **how)
     with pytest.raises(ValueError, match="capacity has no entry for solid 'pad'"):
         iga_nn.march(two_patches(), warmed, "1", **how | {"capacity": {"steel": 1.0}})
+
+
+class Conducting(iga_nn.Form):
+    """A conductivity that falls or grows with the temperature."""
+
+    linear = symmetric = False
+
+    def __init__(self, kappa, slope=0.0):
+        self.kappa, self.slope = kappa, slope
+
+    def flux(self, u, grad, x):
+        return self.kappa * (1.0 + self.slope * u[0]) * grad
+
+
+def test_solids_have_laws_of_their_own():
+    """Plates of 1 + u and of 2 in series: the first has the temperature t at its end, t + t^2 / 2 = 2 (1 - t)."""
+    law = {"steel": Conducting(1.0, 1.0), "pad": Conducting(2.0)}
+    found = iga_nn.newton(two_patches(), iga_nn.Problem(law, source="0", value={"p0_u0": "0", "p1_u1": "1"}), refine=1)
+    assert found.probe([[1.0, 0.5, 0.5]])[0] == pytest.approx(np.sqrt(13.0) - 3.0, rel=1e-5)
+    flux = found.quantity("flux", [[0.5, 0.5, 0.5], [1.5, 0.5, 0.5]])[:, 0, 0]
+    assert flux == pytest.approx(2.0 * (4.0 - np.sqrt(13.0)), rel=1e-3)
+    with pytest.raises(ValueError, match="form has no entry for solid 'pad'; the body has steel, pad"):
+        iga_nn.newton(two_patches(), iga_nn.Problem({"steel": law["steel"]}, source="0", value={"p0_u0": "0"}))
+
+
+def test_laws_of_solids_agree_in_their_kind():
+    class Elsewhere(iga_nn.Form):
+        components = 3
+
+    with pytest.raises(ValueError, match="form: the laws of a body must agree in components"):
+        iga_nn.Problem({"steel": Conducting(1.0), "pad": Elsewhere()}, source="0", value="u0")
+    with pytest.raises(TypeError, match="form must be an instance of a subclass of Form, got 8"):
+        iga_nn.Problem({"steel": Conducting(1.0), "pad": 8.0}, source="0", value="u0")

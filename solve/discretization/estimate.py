@@ -18,7 +18,7 @@ from ..forms.boundary_value_problem import BoundaryValueProblem
 from ..forms.form import Form
 from .error_norms import Errors, ratio
 from .face_data import has_face
-from .residual import INSIDE, Inside, OnFace, Solved, blocks, dot, law_of, mean, quadratic, residuals_of
+from .residual import INSIDE, Inside, OnFace, Solved, blocks, dot, mean, quadratic, residuals_of
 from .smooth_parts import smooth_parts
 from .space import TrialSpace
 from .waves import Directions, Waves, wave_lengths
@@ -58,7 +58,7 @@ def why_not_estimated(spaces: Sequence[TrialSpace], problems: Sequence[BoundaryV
         return "degree 1 has too little of a residual inside"
     if any(space.whole is not space and space.is_only_continuous for space in spaces):
         return "several processes share a space that is only continuous"
-    laws = {law_of(problem): problem for problem in problems}.values()
+    laws = {problem.in_volume: problem for problem in problems}.values()
     return next((why for law in laws if (why := law.not_differentiable or law.form.caveat)), "")
 
 

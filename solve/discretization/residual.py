@@ -8,7 +8,7 @@ Patches with equal knots, law and data are a group, whose arrays are one: a `Res
 """
 
 from collections import defaultdict
-from collections.abc import Hashable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -227,18 +227,13 @@ class Residual:
         ]
 
 
-def law_of(problem: BoundaryValueProblem) -> Hashable:
-    """Return what is equal for patches with the same law and the same data in the volume."""
-    return problem.in_volume, None if isinstance(problem, Form) else id(problem.form)
-
-
 def residuals_of(patches: Sequence[Solved]) -> list[Residual]:
     """Return the residuals of the patches in groups of equal spaces, knots of the map, law and data in the volume."""
     members = defaultdict(list)
     for number, patch in enumerate(patches):
         rows = (row.tobytes() for row in (*patch.space.knots, *patch.volume.knots))
         spline = patch.space.degrees, patch.volume.degrees, *rows, patch.volume.weights is None
-        members[patch.is_own, *spline, law_of(patch.problem), patch.problem.has_fields and patch.ends].append(number)
+        members[patch.is_own, *spline, patch.problem.in_volume, patch.problem.has_fields and patch.ends].append(number)
     return [Residual.of(numbers, patches) for numbers in members.values()]
 
 

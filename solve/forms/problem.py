@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Hashable, Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass, field
-from typing import ClassVar
+from typing import ClassVar, Self
 
 from .boundary_value_problem import BoundaryValueProblem
 from .conditions import OF_SCALARS, Condition, GivenRegions, OnFaces
 from .data import Data
 from .form import Form
+from .owners import Owner, entry_of
+
+ALIKE = ("components", "symmetric", "linear", "constant", "has_reaction")  # parts in which the laws of solids agree
 
 
 class LawWithData(BoundaryValueProblem, Form):
@@ -33,8 +36,8 @@ class Problem(BoundaryValueProblem):
 
     Parameters
     ----------
-    form : Form
-        The law.
+    form : Form, or dict of solid or patch to Form
+        The law; of several solids also one for each, as in {"steel": Hooke(210000.0), "pad": Rubber(8.0)}.
     exact : datum, optional
         The solution, where it is known; as formulas it gives the source and all data on faces.
     source : datum, optional
@@ -57,6 +60,8 @@ class Problem(BoundaryValueProblem):
     ------
     TypeError
         For a law that is no instance of a subclass of `Form`.
+    ValueError
+        For laws of solids that differ in their components, or in being symmetric, linear, constant or with a reaction.
     ExpressionError
         For a formula that is refused.
     ValueError
@@ -76,7 +81,7 @@ class Problem(BoundaryValueProblem):
     True
     """
 
-    form: Form
+    form: Form  # the first one of several
     _: KW_ONLY
     exact: Data | None = None
     source: Data | None = None
@@ -88,10 +93,34 @@ class Problem(BoundaryValueProblem):
     inflow: GivenRegions | None = None
     exchange: GivenRegions | None = None
 
+    laws: Mapping[Owner, Form] = field(init=False, repr=False, compare=False)
+
     keywords: ClassVar = OF_SCALARS
 
     def __post_init__(self) -> None:
-        if not isinstance(self.form, Form):
-            raise TypeError(f"form must be an instance of a subclass of Form, got {self.form!r}")
+        laws: Mapping[Owner, Form] = self.form if isinstance(self.form, Mapping) else {}
+        given = list(laws.values()) or [self.form]
+        for form in given:
+            if not isinstance(form, Form):
+                raise TypeError(f"form must be an instance of a subclass of Form, got {form!r}")
+        for name in ALIKE:
+            if len({getattr(form, name) for form in given}) > 1:
+                raise ValueError(f"form: the laws of a body must agree in {name}")
+        self._assign(form=given[0], laws=laws)
         self._read_keywords()
         self._set({"exact": self.exact, "source": self.source}, self.boundary, self.neumann, self.robin)
+
+    @property
+    def by_patch(self) -> dict[str, Collection[Owner]]:
+        """Return the patches or solids for which data or laws are given one by one, by the name of the datum."""
+        return super().by_patch | ({"form": self.laws.keys()} if self.laws else {})
+
+    @property
+    def in_volume(self) -> Hashable:
+        """Return what law and data in the volume are made of; a user's law is known by its object."""
+        return super().in_volume, id(self.form)
+
+    def of_patch(self, patch: int, solid: str = "") -> Self:
+        """Return the problem with the data and the law of a patch and its solid."""
+        form = entry_of(self.laws or self.form, patch, solid)
+        return super().of_patch(patch, solid)._assign(form=form)
