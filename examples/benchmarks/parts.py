@@ -245,11 +245,12 @@ def watched(command: Sequence[str], limit: float) -> Ended:
     start, cpu, memory = time.monotonic(), 0.0, 0.0
     with tempfile.TemporaryFile("w+") as output, tempfile.TemporaryFile("w+") as errors:
         root = psutil.Popen(command, stdout=output, stderr=errors, stdin=subprocess.DEVNULL)
-        while (code := root.poll()) is None and time.monotonic() - start < limit:
-            seconds, bytes_now = looked_at(root)
-            cpu, memory = max(cpu, seconds), max(memory, bytes_now / MEGABYTE)
-            time.sleep(LOOK)
-        if code is None:
+        try:
+            while (code := root.poll()) is None and time.monotonic() - start < limit:
+                seconds, bytes_now = looked_at(root)
+                cpu, memory = max(cpu, seconds), max(memory, bytes_now / MEGABYTE)
+                time.sleep(LOOK)
+        finally:
             end(root)
         texts = [file.read() for file in (output, errors) if file.seek(0) == 0]
     return Ended(code, *texts, time.monotonic() - start, cpu, memory)
@@ -267,10 +268,11 @@ def looked_at(root: psutil.Process) -> tuple[float, float]:
 
 
 def end(root: psutil.Process) -> None:
-    """End a process and its descendants."""
-    for process in (*root.children(recursive=True), root):
-        with suppress(psutil.NoSuchProcess):
-            process.kill()
+    """End a process and its descendants, where they have not ended."""
+    with suppress(psutil.NoSuchProcess):
+        for process in (*root.children(recursive=True), root):
+            with suppress(psutil.NoSuchProcess):
+                process.kill()
     root.wait()
 
 
