@@ -4,9 +4,9 @@ import re
 
 import numpy as np
 import pytest
-from mesh_files import CUBE, TRIANGLES, ball, joined, obj
+from mesh_files import CUBE, TRIANGLES, ball, joined, obj, text_stl
 
-from parameterize.surface.surface import MeshError, bodies_in, surface_from_arrays
+from parameterize.surface.surface import MeshError, bodies_in, load_surface, surface_from_arrays
 
 
 def test_largest_is_the_one_of_most_volume():
@@ -66,6 +66,15 @@ def test_bodies_that_touch_in_equal_triangles_are_glued():
     assert np.array_equal(surface.groups["lower"], np.flatnonzero(surface.owners == 0))  # group:lower is its boundary
     assert np.all(surface.walls.corners[..., 2] == 1.0) and surface.walls.solids.tolist() == [[0, 1], [0, 1]]
     assert "glued solids over an area of 1, 2 faces" in surface.notices
+
+
+def test_solids_of_an_stl_that_touch_are_told_apart_by_their_names(tmp_path):
+    path = tmp_path / "two.stl"
+    path.write_text("".join(text_stl(*cube((0, 0, k))).replace("cube", name) for k, name in enumerate(("pad", "base"))))
+    surface = load_surface(path)
+    assert surface.solids == ("pad", "base") and len(surface.faces) == 20 and len(surface.walls.corners) == 2
+    assert surface.summary()["solids"] == ["pad", "base"]
+    assert load_surface(path, component=0).volume == pytest.approx(1.0)
 
 
 def test_bodies_that_touch_in_an_edge_are_not_glued():

@@ -180,6 +180,7 @@ class Surface(Brief, Shown):
         """Return the section `input` of report.json."""
         first = self.crossings[: topology.SHOWN]
         places = topology.crossing_places(self.vertices, self.faces, first)
+        several = len(self.solids) > 1
         return {
             "file": self.source or self.name,
             "sha256": self.sha256,
@@ -187,7 +188,8 @@ class Surface(Brief, Shown):
             "faces": len(self.faces),
             "volume": self.volume,
             "genus": self.genus,
-            **({} if self.is_plain else {"shells": self.shells, "solids": list(self.solids)}),
+            **({"shells": self.shells} if self.shells > 1 else {}),
+            **({"solids": [name or f"solid{k}" for k, name in enumerate(self.solids, 1)]} if several else {}),
             "bbox": [corner.tolist() for corner in self.bbox],
             **({"unit": self.unit} if self.unit else {}),
             "self_intersections": {
