@@ -89,3 +89,10 @@ def area_shares(vertices: Array, faces: IntArray) -> Array:
     _, area = normals_and_areas(vertices, faces)
     share = np.bincount(faces.ravel(), np.repeat(area / 3.0, 3), minlength=len(vertices))
     return np.asarray(share / share.sum())
+
+
+def corner_angles(vertices: Array, faces: IntArray) -> Array:
+    """Return the angles (m, 3) of triangles at their corners, in radians."""
+    corners = vertices[faces]
+    after, before = np.roll(corners, -1, axis=1) - corners, np.roll(corners, 1, axis=1) - corners
+    return np.asarray(np.arctan2(np.linalg.norm(np.cross(after, before), axis=2), np.sum(after * before, axis=2)))

@@ -32,9 +32,14 @@ def closest_triangles(points: Array, vertices: Array, faces: IntArray) -> tuple[
         np.ascontiguousarray(points, dtype=np.float64), target, triangles
     )
     nearest = np.asarray(index, dtype=np.int64).ravel()
-    a, b, c = np.moveaxis(target[triangles[nearest]], 1, 0)  # (m, 3) each
-    edges = np.stack([b - a, c - a], axis=-1)  # (m, 3, 2)
-    shares = np.einsum("mkx,mx->mk", np.linalg.pinv(edges), foot - a)  # least squares: a sliver does no harm
-    weights = np.clip(np.column_stack([1.0 - shares.sum(axis=1), shares]), 0.0, 1.0)
-    weights /= weights.sum(axis=1, keepdims=True)
+    weights = shares_of(foot, target[triangles[nearest]])
     return np.sqrt(np.asarray(squared).ravel()), nearest, weights
+
+
+def shares_of(points: Array, corners: Array) -> Array:
+    """Return the barycentric weights (m, 3), none negative, of points (m, 3) in triangles, corners (m, 3, 3)."""
+    a, b, c = np.moveaxis(corners, 1, 0)
+    edges = np.stack([b - a, c - a], axis=-1)  # (m, 3, 2)
+    shares = np.einsum("mkx,mx->mk", np.linalg.pinv(edges), points - a)  # least squares: a sliver does no harm
+    weights = np.clip(np.column_stack([1.0 - shares.sum(axis=1), shares]), 0.0, 1.0)
+    return np.asarray(weights / weights.sum(axis=1, keepdims=True))
