@@ -7,6 +7,7 @@ from cube_grids import box
 import iga_nn
 from iga_nn import Body
 from parameterize.checkpoint import Checkpoints
+from parameterize.files import load_arrays, save_arrays
 from parameterize.spline import archive
 from parameterize.spline.solids import PatchSolids
 from parameterize.spline.spline_map import ControlNets, SplineMap
@@ -58,6 +59,22 @@ def test_solids_are_in_the_file(most, monkeypatch, tmp_path):
     Body.from_patches(ROW).save(tmp_path / "plain.npz")
     assert not {"solids", "solid_names"} & set(archive.array_names(tmp_path / "plain.npz"))
     assert iga_nn.load_volume(tmp_path / "plain.npz").solids.is_plain
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        ({"solids": np.array([0.0, 1.0, 0.0])}, "whole numbers from 0 on"),
+        ({"solids": np.array([0, 1])}, "solids are given of 2 patches: the body has 3"),
+        ({"solid_names": np.array("steel")}, "there is a solid 1, but the solids have 1 names"),
+    ],
+)
+def test_damaged_solids_are_refused(change, says, tmp_path):
+    Body.from_patches(ROW, solids=["steel", "pad", "steel"]).save(tmp_path / "body.npz")
+    held = load_arrays(tmp_path / "body.npz", tuple(archive.array_names(tmp_path / "body.npz")))
+    save_arrays(tmp_path / "bad.npz", **held | change)
+    with pytest.raises(iga_nn.InputError, match=r"bad\.npz: .*" + says):
+        iga_nn.load_volume(tmp_path / "bad.npz")
 
 
 def test_solids_are_kept_on_finer_knots_and_in_checkpoints(tmp_path):

@@ -43,7 +43,8 @@ def _solid_arrays(solids: PatchSolids) -> dict[str, Floats]:
 def load_solids(path: str | Path) -> PatchSolids:
     """Read the solids of patches, all of one where the file has none. Raises ValueError as `PatchSolids`."""
     arrays = load_arrays(path, (), ("solids", "solid_names"))
-    return PatchSolids(arrays["solids"], tuple(arrays["solid_names"].tolist())) if len(arrays) == 2 else PatchSolids()
+    names = tuple(map(str, arrays.get("solid_names", np.empty(0)).ravel().tolist()))
+    return PatchSolids(arrays["solids"], names) if "solids" in arrays else PatchSolids()
 
 
 def _arrays(patch: BSplineVolume) -> PatchArrays:

@@ -23,12 +23,15 @@ _CORNERS = np.array([(0, 1, 2, 3), (1, 0, 3, 2), (2, 3, 0, 1), (3, 2, 1, 0)])  #
 
 
 def spline_of_tetrahedra(found: CurvedMesh, degree: int, names: tuple[str, ...] = ()) -> SplineMap:
-    """Return the map of the four hexahedra of each tetrahedron, one after the other; names: of the solids."""
+    """Return the map of the four hexahedra of each tetrahedron, one after the other.
+
+    names: of the solids; that of a single one is left out, because maps of other ways keep none either.
+    """
     mesh = found.mesh
     knots = (open_uniform_knots(degree + 1, degree),) * 3
     points, hexahedra = hexahedra_of(found)
     numbers = np.repeat(mesh.solids, PARTS)
-    solids = PatchSolids(numbers, names if len(names) > numbers.max() else ())
+    solids = PatchSolids(numbers, names if len(names) > max(1, numbers.max()) else ())
     nets = ControlNets(degree, (knots,) * len(hexahedra), Complex(points, hexahedra).interfaces, solids)
     local = found.nodes[mesh.numbering.cells]
     control = np.einsum("hcn,tnx->xthc", control_points_of_nodes(degree), local, optimize=True)
