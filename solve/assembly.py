@@ -3,17 +3,18 @@
 from collections import defaultdict
 from collections.abc import Hashable, Sequence
 from dataclasses import replace
-from typing import Any, NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 
-from parameterize.arrays import Array
+from parameterize.arrays import Array, IntArray
+from parameterize.spline.patch_groups import groups_of
 from parameterize.spline.volume import FACE_NAMES, BSplineVolume
 
-from .discretization.face_data import FaceRule, coefficients_of_patches, face_rule, has_face
+from .discretization.face_data import FaceRule, coefficients_of_patches, face_rules, has_face
 from .discretization.grouped import BodyMatrix, Law, assemble_body
 from .discretization.groups import CoefficientLayout, OnPatches
-from .discretization.on_regions import renewed, weak_faces
+from .discretization.on_regions import Stated, renewed, weak_faces
 from .discretization.operator import FormOperator, Operator
 from .discretization.roughness import Measured, rules_of
 from .discretization.space import TrialSpace
@@ -30,22 +31,6 @@ SAMPLES = np.array([0.07, 0.35, 0.62, 0.91])  # parameters a direction at which 
 LARGEST_IMBALANCE = 0.01  # of the data's size; quadrature leaves far less of data in balance
 
 
-class Stated(Protocol):
-    """Describe a problem on one patch of a body: its volume, the problem with the patch's data, and the trial space."""
-
-    @property
-    def volume(self) -> BSplineVolume:
-        """Return the map."""
-
-    @property
-    def problem(self) -> BoundaryValueProblem:
-        """Return the problem with the data of the patch."""
-
-    @property
-    def space(self) -> TrialSpace:
-        """Return the trial space."""
-
-
 class Assembled(NamedTuple):
     """Hold the matrix of a body, and for each patch the loads and the fixed coefficients (c, n_u, n_v, n_w)."""
 
@@ -59,7 +44,7 @@ class Assembled(NamedTuple):
         laws = [
             law._replace(form=WithMass(law.form, factor), source=None, same=(law.same, factor)) for law, factor in each
         ]
-        return self._replace(matrix=self.matrix.of(laws).with_faces([own.faces for own in self.matrix.parts]))
+        return self._replace(matrix=self.matrix.of(laws).with_faces(self.matrix.faces))
 
     def mass(self, factors: Array) -> BodyMatrix:
         """Return the mass matrix of one component, times the factor (n,) of each patch.
@@ -80,12 +65,11 @@ class Assembled(NamedTuple):
             for law, patch, same in each
         ]
         _, loads = assemble_body(matrix.layout, laws, matrix.parts[0].threads)
-        for patch, own, load in zip(patches, matrix.parts, loads, strict=True):
-            if patch.problem.conditions:
-                for face in own.faces.values():
-                    renewed(face, patch.problem).add_load(load)
-            else:
-                _on_faces(patch.volume, patch.problem, patch.space, load)
+        if patches[0].problem.conditions:
+            for face in matrix.weak:
+                _add_load(renewed(face, patches[face.patches[0]].problem), loads)
+        else:
+            _on_faces(patches, _in_volumes(patches), loads)
         return Assembled(matrix, loads, _known(patches, matrix.layout))
 
 
@@ -103,11 +87,9 @@ def assemble_body_data(patches: Sequence[Stated], options: SolveOptions) -> Asse
         laws.append(Law(patch.volume, patch.space, rule, form, source, component, law))
     layout = CoefficientLayout.of([patch.space for patch in patches])
     matrix, loads = assemble_body(layout, laws, options.thread_count)
-    terms: list[dict[str, Any]] = []
-    for patch, load in zip(patches, loads, strict=True):
-        with patch.space.agreed():
-            on_boundary = _on_regions if patch.problem.conditions else _on_faces
-            terms.append(on_boundary(patch.volume, patch.problem, patch.space, load))
+    with patches[0].space.agreed():
+        on_boundary = _on_regions if patches[0].problem.conditions else _on_faces
+        terms = on_boundary(patches, same, loads)
     return Assembled(matrix.with_faces(terms), loads, _known(patches, layout))
 
 
@@ -170,31 +152,50 @@ class OnePatch(NamedTuple):
     space: TrialSpace
 
 
-def _on_faces(
-    volume: BSplineVolume, problem: BoundaryValueProblem, space: TrialSpace, load: Array
-) -> dict[str, FaceRule]:
-    """Add the data on the images of the cube's faces to a load, and return the rules of the faces with Robin's term."""
-    robin = {}
-    for name in FACE_NAMES:
-        if name in space.dirichlet or not has_face(space, name):
-            continue
-        face = face_rule(volume, space, name)
-        alpha, data = problem.on_face(name, face.points, face.normal)
-        if alpha is not None:
-            robin[name] = replace(face, measure=alpha * face.measure)
-        for density, total in zip(data, load, strict=True):
-            total[face.layer] += face.integrate(density)
+def _on_faces(patches: Sequence[Stated], same: Sequence[Hashable], loads: OnPatches) -> list[FaceRule]:
+    """Add the data on the images of the cube's faces to loads, and return the rules of the faces with Robin's term.
+
+    Faces of patches that are alike are one rule. same: equal for patches with the same law.
+    """
+    robin = []
+    for group in groups_of([patch.volume for patch in patches]):
+        for name in FACE_NAMES:
+            for places in _alike([patches[i] for i in group.numbers], [same[i] for i in group.numbers], name):
+                own = group.rows(places)
+                first = patches[own.numbers[0]]
+                face = face_rules(own, first.space, name)
+                alpha, data = face.data(first.problem)
+                if alpha is not None:
+                    robin.append(replace(face, measure=alpha * face.measure))
+                found = np.zeros((len(own), loads.components, *first.space.shape))
+                face.add_load(data, found)
+                loads.add(face.patches, found)
     return robin
 
 
-def _on_regions(
-    volume: BSplineVolume, problem: BoundaryValueProblem, space: TrialSpace, load: Array
-) -> dict[str, WeakFace]:
-    """Add the data on regions of the boundary to a load, and return the faces of the cube with terms, by name."""
-    faces = weak_faces(volume, problem, space)
+def _alike(patches: Sequence[Stated], same: Sequence[Hashable], name: str) -> list[IntArray]:
+    """Return the places of patches whose faces of a name have the same space and data, which are not values of u."""
+    found = defaultdict(list)
+    for place, (patch, law) in enumerate(zip(patches, same, strict=True)):
+        space = patch.space
+        if name in space.outer and name not in space.dirichlet:
+            knots = (row.tobytes() for row in space.knots)
+            found[space.degrees, *knots, law, patch.problem.key_on(name)].append(place)
+    return [np.array(places) for places in found.values() if has_face(patches[places[0]].space, name)]
+
+
+def _on_regions(patches: Sequence[Stated], same: Sequence[Hashable], loads: OnPatches) -> list[WeakFace]:
+    """Add the data on regions of the boundary to loads, and return the terms; `same` as for `_on_faces`."""
+    faces = weak_faces(patches, same)
     for face in faces:
-        face.add_load(load)
-    return {face.name: face for face in faces}
+        _add_load(face, loads)
+    return faces
+
+
+def _add_load(face: WeakFace, loads: OnPatches) -> None:
+    found = np.zeros((len(face.patches), loads.components, *loads.layout.shapes[face.patches[0]]))
+    face.add_load(found)
+    loads.add(face.patches, found)
 
 
 def balanced(load: Array, unknowns: Unknowns) -> Array:

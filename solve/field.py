@@ -55,6 +55,12 @@ class Points(np.ndarray[Any, Any]):
         return cls.of(np.moveaxis(volume.grid(u, v, w), -1, 0), (u, v, w))
 
 
+def part_of(x: Points, points: Any) -> Points:
+    """Return some of the points (3, m) with known parameters."""
+    assert x.places is not None
+    return Points.at(np.ascontiguousarray(x[:, points]), x.places[points])
+
+
 class FieldOnBody:
     """Describe a function on a body: a SplineField on its only patch, or a BodyField with one on each patch."""
 

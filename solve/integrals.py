@@ -1,6 +1,8 @@
 """Integrates over a body, or over regions of its boundary: volume, mass, areas, averages, resultants."""
 
+from collections import defaultdict
 from collections.abc import Callable, Iterator, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -8,16 +10,15 @@ from numpy.typing import ArrayLike
 from parameterize.arrays import Array, IntArray
 from parameterize.spline.body import Body, BodyLike, as_body
 from parameterize.spline.bspline import breakpoints, gauss_points
-from parameterize.spline.interface import axis_side
-from parameterize.spline.orientation import exact_points
-from parameterize.spline.volume import BSplineVolume
+from parameterize.spline.orientation import FACES, exact_points, orientations
+from parameterize.spline.volume import FACE_NAMES, BSplineVolume
 
 from .discretization.space import TrialSpace, same_smoothness
-from .discretization.surface_rule import SurfaceRule, surface_rule
+from .discretization.surface_rule import Faces, SurfaceRule, surface_rules
 from .field import Points
 from .forms.form import Quantity
 from .forms.frame import UnitFrame
-from .forms.region import Region, Regions, regions_of
+from .forms.region import FacesOfPoints, Region, Regions, regions_of, tolerances
 from .quantities import at_points, grid_values, quantity_of, slabs
 from .solution import PatchSolution, Solution
 
@@ -154,25 +155,44 @@ def _surface_rules(body: Domain, over: Regions) -> Iterator[tuple[Patch, Surface
     Each rule comes with its patch. Raises ValueError where that part is empty.
     """
     regions, glued, found = _placed(body, over), _maps(body), False
-    for number, (patch, names) in enumerate(zip(_patches(body), glued.outer, strict=True)):
-        degree = max(_counts(patch)) - 1  # a rule has a point more
-        rows = [same_smoothness(knots, old, degree) for knots, old in zip(patch.knots, patch.degrees, strict=True)]
-        space = TrialSpace((degree, degree, degree), (rows[0], rows[1], rows[2]))
-        for face in names:
-            name = glued.face_name(number, face)
+    length = None if glued.is_single else UnitFrame.of(glued).length
+    needs_normal = any(region.needs_normal for region in regions)
+    patches = _patches(body)
+    for faces, space in _outer_faces(patches, glued):
+        name = FACE_NAMES[2 * faces.axis + faces.side]
+        names, near = [glued.face_name(i, name) for i in faces.group.numbers.tolist()], tolerances(faces.nets)
 
-            def codes(x: Array, normal: Array, name: str = name) -> IntArray:
-                return np.any([region.holds(x, normal, name) for region in regions], axis=0).astype(np.int64)
+        def codes(x: Array, normal: Array, owners: IntArray, names: Any = names, near: Any = near) -> IntArray:
+            on = FacesOfPoints(names, owners, near[owners])
+            return np.any([region.holds_on(x, normal, on) for region in regions], axis=0).astype(np.int64)
 
-            needs_normal = any(region.needs_normal for region in regions)
-            rule = surface_rule(_volume_of(patch), space, *axis_side(face), codes, needs_normal=needs_normal)
-            if rule is not None:
-                found = True
-                yield patch, rule
+        rule = surface_rules(faces, space, codes, length, needs_normal)
+        if rule is None:
+            continue
+        found = True
+        for owner in np.unique(rule.at.owners):
+            yield patches[faces.group.numbers[owner]], rule.part(np.flatnonzero(rule.at.owners == owner))
     if not found:
         raise ValueError(
             f"over {', '.join(repr(str(region)) for region in regions)}: no part of the boundary lies there"
         )
+
+
+def _outer_faces(patches: Sequence[Patch], body: Body) -> Iterator[tuple[Faces, TrialSpace]]:
+    """Yield the outer faces of one name of patches that are alike, with a space that has the points of their rules."""
+    for group in body.groups:
+        hands = orientations(group)
+        for face, (axis, side) in enumerate(FACES):
+            found = defaultdict(list)
+            for place in np.flatnonzero(~body.glued[group.numbers, face]).tolist():
+                patch = patches[group.numbers[place]]
+                found[patch.degrees, *(row.tobytes() for row in patch.knots)].append(place)
+            for places in found.values():
+                patch, own = patches[group.numbers[places[0]]], np.array(places)
+                degree = max(_counts(patch)) - 1  # a rule has a point more
+                rows = map(same_smoothness, patch.knots, patch.degrees, (degree,) * 3)
+                u, v, w = rows
+                yield Faces(group.rows(own), axis, side, hands[own]), TrialSpace((degree,) * 3, (u, v, w))
 
 
 def _placed(body: Domain, over: Regions) -> list[Region]:

@@ -26,7 +26,7 @@ from .forms.under_law import UnderLaw
 from .linear.pressure_mass import PressureMass
 from .linear.saddle import Pair, Saddle, saddle_point
 from .options import IterationOptions, SolveOptions
-from .patch_system import PatchProblem, PatchSystem
+from .patch_system import PatchProblem
 from .reactions import Balance, balance
 from .system import System, system_of
 
@@ -112,14 +112,8 @@ class MixedSystem(System):
         layout = self.matrix.layout
         u, p = layout.joined([own[:3] for own in full]), layout.joined([own[3:] for own in full])
         forces, _ = _parted(self.divergence.of_pressure(p))
-        patches = [_pressed(*pair) for pair in zip(self.patches, p, strict=True)]
-        return balance(self.problem, patches, self.unknowns, u, forces + self.matrix.apply(u))
-
-
-def _pressed(patch: PatchSystem, p: Array) -> PatchSystem:
-    """Return the system of a patch, with its faces under a pressure p, (1, n_u, n_v, n_w)."""
-    faces = {face.name: PressedFace.of(face, p) for face in patch.weak}
-    return replace(patch, matrix=replace(patch.matrix, faces=faces))
+        faces = [PressedFace.of(face, p.of(face.patches)) for face in self.matrix.weak]
+        return balance(self.problem, self.patches, self.unknowns, faces, u, forces + self.matrix.apply(u))
 
 
 def _parted(both: OnPatches) -> tuple[OnPatches, OnPatches]:
@@ -206,6 +200,6 @@ def _volumes_given(displacement: System, divergence: Divergence) -> Array:
     layout = displacement.matrix.layout
     found = divergence.of_displacement(layout.joined([patch.known for patch in displacement.patches]))
     given = replace(found, flat=-found.flat)
-    for patch, face in divergence.faces:
-        face.add_load(given[patch])
+    for face in divergence.faces:
+        face.add_load(given)
     return given.flat

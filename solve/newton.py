@@ -23,18 +23,16 @@ from .discretization.nonlinear import Forces, Tangent
 from .discretization.on_regions import demand_area
 from .discretization.space import longest_edges
 from .discretization.unknowns import Glued, Unknowns, unknowns_of
-from .discretization.weak import WeakFace
 from .field import FieldOnBody
 from .forms.boundary_value_problem import BoundaryValueProblem
 from .forms.form import Form
 from .forms.problem import Problem
 from .forms.under_law import UnderLaw
 from .linear.krylov import generalized_residuals
-from .linear.low_order import entries_of, on_trilinear, survey_of
+from .linear.low_order import entries_of, on_trilinear, survey_of, surveyed
 from .linear.nodal import NodalBasis
-from .linear.preconditioner import leaves_constants
 from .options import SolveOptions
-from .patch_system import PatchProblem, operators_of
+from .patch_system import PatchProblem
 from .solution import Solution, SolveReport
 from .solver import prepared
 from .system import coefficients_in, demand_fixed, field_of, glued, is_diagonalized, preconditioner
@@ -169,10 +167,9 @@ class _Balance:
         problems: list[Any] = [UnderLaw(patch.problem, _Simple(patch.problem.form.components)) for patch in patches]
         simple = [OnePatch(own.volume, one, own.space) for own, one in zip(patches, problems, strict=True)]
         matrix, loads, known = assemble_body_data(simple, options)
-        on_regions = [face for own in matrix.parts for face in own.faces.values() if isinstance(face, WeakFace)]
-        demand_area(problem, on_regions, patches[0].space, body.patches)
+        demand_area(problem, matrix.weak, patches[0].space, body.patches)
         if len(body.parts) > 1 and not problem.form.has_reaction:
-            free = np.array([all(map(leaves_constants, own)) for own in operators_of(matrix, loads.components)])
+            free = surveyed(matrix).free
             for part in body.parts:
                 demand_fixed(part, free[list(part)], patches[0].space)
         unknowns = unknowns_of([patch.space for patch in patches], body.interfaces)
@@ -220,7 +217,7 @@ class _Balance:
     def _solved(self, full: OnPatches, tangent: Tangent, right: Array, tolerance: float) -> Array:
         """Return the solution of a linear system, by GMRES where the matrix is not definite."""
         blocks, joined = [tangent.block(i) for i in range(len(right))], self.loads.layout.joined
-        survey = survey_of(self.loads.layout, len(right), blocks)
+        survey = survey_of(self.forces.matrix, blocks)
         form = self.forces.forms[0]
 
         def product(x: Array) -> Array:

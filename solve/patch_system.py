@@ -12,7 +12,6 @@ from .assembly import Assembled
 from .discretization.grouped import BodyMatrix
 from .discretization.operator import FormOperator, Operator
 from .discretization.space import TrialSpace
-from .discretization.weak import WeakFace
 from .forms.boundary_value_problem import BoundaryValueProblem
 
 
@@ -36,11 +35,6 @@ class PatchSystem(PatchProblem):
     matrix: Operator | FormOperator
     known: Array
     loads: Array
-
-    @property
-    def weak(self) -> list[WeakFace]:
-        """Return the faces of the patch with terms of conditions on regions."""
-        return [face for face in self.matrix.faces.values() if isinstance(face, WeakFace)]
 
     def at_rest(self) -> "PatchSystem":
         """Return the same system with the value zero wherever values are given."""

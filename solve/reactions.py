@@ -12,11 +12,13 @@ import numpy as np
 from parameterize.arrays import Array, in_brackets
 from parameterize.spline.volume import FACE_NAMES
 
-from .discretization.face_data import face_rule, has_face
+from .discretization.face_data import FaceRule
+from .discretization.groups import OnPatches
+from .discretization.operator import FaceTerm
 from .discretization.space import TrialSpace
 from .discretization.unknowns import Unknowns
 from .discretization.weak import WeakFace
-from .field import Points
+from .field import part_of
 from .forms.boundary_value_problem import BoundaryValueProblem
 from .patch_system import PatchSystem
 
@@ -80,35 +82,43 @@ def balance(
     problem: BoundaryValueProblem,
     patches: Sequence[PatchSystem],
     unknowns: Unknowns,
+    faces: Sequence[FaceTerm],
     coefficients: Sequence[Array],
-    products: Sequence[Array],
+    products: OnPatches,
 ) -> Balance:
-    """Return the balance of a solution's coefficients (c, n_u, n_v, n_w) of each patch, and of their products."""
-    processes, components = unknowns.processes, problem.form.components
-    residuals = [product - patch.loads for patch, product in zip(patches, products, strict=True)]
-    faces = [face for patch in patches for face in patch.weak]
+    """Return the balance of a solution's coefficients (c, n_u, n_v, n_w) of each patch, and of their products.
+
+    faces: the terms on faces of the patches.
+    """
+    processes, layout, total = unknowns.processes, products.layout, unknowns.processes.total
+    loads, full = layout.joined([patch.loads for patch in patches]), layout.joined(coefficients)
+    residuals = products - loads
     rows = processes.shared(list(_of_faces(unknowns.patches, patches, unknowns.on_fixed(residuals))))
     reactions: dict[str, Array] = {}
     for _, role, force in sorted(chain.from_iterable(rows), key=lambda row: row[0]):
         reactions[role] = reactions.get(role, 0.0) + force
-    own = np.zeros(components)
-    supports = _supports(problem)
-    for patch, full in zip(patches, coefficients, strict=True):
-        outside = _add_regions(patch.problem, patch.weak, full, supports) + _add_robin_faces(patch, full, supports)
-        lifted = sum(((f.weights * f.gamma * f.values).sum(axis=1) for f in patch.weak), np.zeros(components))
-        own = own + patch.loads.sum(axis=(1, 2, 3)) - lifted - outside
-    load = processes.total(own)
-    reactions |= {role: processes.total(force) for role, force in supports.items()}
+    own: Any = sum(part.sum(axis=(0, 2, 3, 4)) for part in loads.in_groups)
+    roles = chain.from_iterable(processes.shared(_supports(problem, patches)))
+    supports = {role: np.zeros(problem.form.components) for role in roles}
+    for face in faces:
+        here, on_face = [patches[place].problem for place in face.patches], full.of(face.patches)
+        if isinstance(face, WeakFace):
+            own = own - (face.weights * face.gamma * face.values).sum(axis=1)
+            own = own - _add_regions(here[0], face, on_face, supports)
+        elif isinstance(face, FaceRule):
+            own = own - _add_robin_faces(here, face, on_face, supports)
+    load = total(own)
+    reactions |= {role: total(force) for role, force in supports.items()}
     forces = [load, *reactions.values()]
     size = float(np.abs(forces).sum())
-    parts = [part for patch, residual in zip(patches, residuals, strict=True) for part in (patch.loads, residual)]
-    scale = float(processes.total(sum(np.abs(part).sum() for part in parts)))
+    scale = float(total(np.abs(loads.flat).sum() + np.abs(residuals.flat).sum()))
     size = scale if size < CANCELLED * scale else size
     imbalance = None
     if reactions and not problem.form.has_reaction:
         imbalance = float(np.abs(np.sum(forces, axis=0)).max()) / size if size > 0.0 else 0.0
+    weak = [face for face in faces if isinstance(face, WeakFace)]
     areas = {
-        condition.role: float(processes.total(sum(face.weights[face.holds(i)].sum() for face in faces)))
+        condition.role: float(total(sum(face.weights[face.holds(i)].sum() for face in weak)))
         for i, condition in enumerate(problem.conditions)
         if not condition.is_strong
     }
@@ -144,44 +154,46 @@ def _has_end(space: TrialSpace, name: str) -> bool:
     return bool(rows.stop == space.whole.shape[0] if name == "u1" else rows.start == 0)
 
 
-def _supports(problem: BoundaryValueProblem) -> dict[str, Array]:
-    """Return zero for each support on a region, by its role."""
-    return {c.role: np.zeros(problem.form.components) for c in problem.conditions if c.is_support and not c.is_strong}
+def _supports(problem: BoundaryValueProblem, patches: Sequence[PatchSystem]) -> list[str]:
+    """Return the roles of the supports on regions, and of the faces of patches with Robin data."""
+    roles = [c.role for c in problem.conditions if c.is_support and not c.is_strong]
+    problems = [patch.problem for patch in patches if patch.problem.faces]
+    robin = [(own, one) for own in problems for one in own.faces if one.factor is not None]
+    return roles + [own.prefix + name for own, one in robin for name in one.faces]
 
 
-def _add_robin_faces(patch: PatchSystem, coefficients: Array, found: dict[str, Array]) -> Array:
-    """Add the reactions of whole faces with Robin data, and return their flux into a body of u = 0."""
-    outside = np.zeros(len(coefficients))
-    for name in (name for one in patch.problem.faces if one.factor is not None for name in one.faces):
-        force = found.setdefault(patch.problem.prefix + name, np.zeros(len(coefficients)))
-        if has_face(patch.space, name):
-            face = face_rule(patch.volume, patch.space, name)
-            alpha, given = patch.problem.on_face(name, face.points, face.normal)
-            u = np.stack([face.bases[0] @ component[face.layer] @ face.bases[1].T for component in coefficients])
-            force += ((given - alpha * u) * face.measure).sum(axis=(1, 2))
-            outside += (given * face.measure).sum(axis=(1, 2))
-    return outside
-
-
-def _add_regions(
-    problem: BoundaryValueProblem, faces: Sequence[WeakFace], coefficients: Array, found: dict[str, Array]
+def _add_robin_faces(
+    problems: Sequence[BoundaryValueProblem], face: FaceRule, coefficients: Array, found: dict[str, Array]
 ) -> Array:
-    """Add the reactions of supports on regions of a patch, and return the flux of an exchange into a body of u = 0."""
-    outside = np.zeros(len(coefficients))
-    for face in faces:
-        taken = np.zeros(len(face.weights), dtype=bool)
-        for i, condition in enumerate(problem.conditions):
-            here = face.holds(i)
-            if condition.is_essential and condition.role in found:
-                found[condition.role] += face.force(coefficients, here & ~taken)
-                taken |= here
-            elif condition.factor is not None and here.any():
-                chosen = np.flatnonzero(here)
-                x = Points.at(np.ascontiguousarray(face.x[:, chosen]), face.x.places[chosen])  # type: ignore[index]
-                free = np.eye(len(coefficients))[:, :, None] - face.projector[:, :, chosen]
-                given = condition.flux_at(problem, x, face.normal[:, chosen])
-                pull = condition.factor_at(x) * face.traces(coefficients)[0][:, chosen]
-                weights = face.weights[chosen]
-                found[condition.role] += (weights * np.einsum("cdm,dm->cm", free, given - pull)).sum(axis=1)
-                outside += (weights * np.einsum("cdm,dm->cm", free, given)).sum(axis=1)
+    """Add the reactions of whole faces with Robin data, and return their flux into a body of u = 0.
+
+    problems: those of the k patches. coefficients: (k, c, n_u, n_v, n_w).
+    """
+    alpha, given = face.data(problems[0])
+    assert alpha is not None
+    forces = ((given - alpha * face.values_of(coefficients)) * face.area).sum(axis=(2, 3))
+    for problem, force in zip(problems, forces.T, strict=True):
+        found[problem.prefix + face.name] += force
+    return np.asarray((given * face.area).sum(axis=(1, 2, 3)))
+
+
+def _add_regions(problem: BoundaryValueProblem, face: WeakFace, coefficients: Array, found: dict[str, Array]) -> Array:
+    """Add the reactions of supports on regions, and return the flux of an exchange into a body of u = 0.
+
+    coefficients: (k, c, n_u, n_v, n_w), of the patches of the faces.
+    """
+    outside, taken = np.zeros(problem.form.components), np.zeros(len(face.weights), dtype=bool)
+    for i, condition in enumerate(problem.conditions):
+        here = face.holds(i)
+        if condition.is_essential and condition.role in found:
+            found[condition.role] += face.force(coefficients, here & ~taken)
+            taken |= here
+        elif condition.factor is not None and here.any():
+            chosen = np.flatnonzero(here)
+            x, weights = part_of(face.x, chosen), face.weights[chosen]
+            free = np.eye(len(outside))[:, :, None] - face.projector[:, :, chosen]
+            given = condition.flux_at(problem, x, face.normal[:, chosen])
+            pull = condition.factor_at(x) * face.traces(coefficients)[0][:, chosen]
+            found[condition.role] += (weights * np.einsum("cdm,dm->cm", free, given - pull)).sum(axis=1)
+            outside += (weights * np.einsum("cdm,dm->cm", free, given)).sum(axis=1)
     return outside

@@ -15,6 +15,7 @@ from parameterize.spline.body import all_control_points, as_body, size_of
 from parameterize.spline.bspline import greville, interpolate_grid
 
 from .discretization.face_data import FaceRule
+from .discretization.operator import FaceTerm
 from .discretization.quadrature import gauss_rule, map_planes
 from .discretization.weak import WeakFace
 from .field import Points
@@ -41,6 +42,7 @@ def rigid_motions(system: System) -> Array:
     for part in as_body(system.body).parts:
         motions = _without_energy([system.patches[i] for i in part])
         supports = [one for i in part for one in _supports(system.patches[i], fixed[i], motions)]
+        supports += [one for face in system.matrix.faces for one in _on_faces(face, part, motions)]
         free = motions.combined(_unheld(supports)) if supports and motions.count else motions
         parts = [np.zeros((free.count, *patch.loads.shape)) for patch in system.patches]
         for i in part:
@@ -105,29 +107,33 @@ def _without_energy(patches: Sequence[PatchSystem]) -> Affine:
 
 
 def _supports(patch: PatchSystem, fixed: Mask, motions: Affine) -> Iterator[Support]:
-    """Yield what holds motions on a patch: fixed coefficients, faces and a reaction, as `_unheld` takes it.
+    """Yield what holds motions on a patch: fixed coefficients and a reaction, as `_unheld` takes it.
 
     fixed: (n_u, n_v, n_w), whether a coefficient is fixed.
     """
     if fixed.any():
         moves = motions.coefficients(patch)[:, :, fixed]
         yield _rows(moves), _rows(moves)
-    for face in patch.matrix.faces.values():
-        if isinstance(face, WeakFace):
-            yield _by_region(face, motions(np.asarray(face.x)))
-        elif isinstance(face, FaceRule):  # Robin's term, with its factor in the measure
-            moves = motions(np.asarray(face.points))[..., face.measure > 0.0]
-            yield _rows(moves), _rows(moves)
     if patch.problem.form.has_reaction:
         for _, _, x in map_planes(patch.volume, gauss_rule(patch.space)):
             yield _by_reaction(patch, x, motions(x))
 
 
-def _by_region(face: WeakFace, moves: Array) -> Support:
-    """Return the support of a face with regions; moves (k, c, m)."""
+def _on_faces(face: FaceTerm, part: Sequence[int], motions: Affine) -> Iterator[Support]:
+    """Yield what terms on faces of a part, patches by their numbers, hold of motions."""
+    own = np.isin(face.patches, part)
+    if isinstance(face, WeakFace):
+        yield _by_region(face, own[face.owners], motions(np.asarray(face.x)))
+    elif isinstance(face, FaceRule):  # Robin's term, with its factor in the measure
+        moves = motions(face.points)[..., (face.measure > 0.0) & own[:, None, None]]
+        yield _rows(moves), _rows(moves)
+
+
+def _by_region(face: WeakFace, own: Mask, moves: Array) -> Support:
+    """Return the support of own points (m,) of faces with regions; moves (k, c, m)."""
     held = np.einsum("cdm,kdm->kcm", face.projector, moves)
     held[..., face.factor > 0.0] = moves[..., face.factor > 0.0]
-    here = (np.einsum("ccm->m", face.projector) > 0.5) | (face.factor > 0.0)
+    here = own & ((np.einsum("ccm->m", face.projector) > 0.5) | (face.factor > 0.0))
     return _rows(moves[..., here]), _rows(held[..., here])
 
 

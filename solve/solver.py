@@ -18,7 +18,6 @@ from .discretization.parted import shared_unknowns
 from .discretization.quadrature import gauss_rule, map_planes
 from .discretization.slab import shared_space
 from .discretization.space import trial_space
-from .discretization.weak import WeakFace
 from .forms.boundary_value_problem import BoundaryValueProblem
 from .forms.elasticity import Elasticity
 from .forms.poisson import Poisson
@@ -208,7 +207,7 @@ def check_problem(body: BodyLike, problem: BoundaryValueProblem, comm: Any = Non
     own = [patches[number] for number in unknowns.patches]
     with unknowns.agreed():
         matrix, loads, _ = assemble_body_data(own, options)
-    faces = [face for part in matrix.parts for face in part.faces.values() if isinstance(face, WeakFace)]
+    faces = matrix.weak
     demand_area(problem, faces, unknowns.processes, glued.patches)
     if problem.fixes_nothing and problem.conditions:
         demand_supports(problem, faces, unknowns.processes, glued.patches)

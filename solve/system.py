@@ -3,7 +3,7 @@
 import functools
 import logging
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
@@ -21,7 +21,7 @@ from parameterize.threads import one_blas_thread
 from .assembly import Assembled, assemble_body_data, balanced
 from .diagnostics import TOO_STIFF, ConvergenceError, failure, folded_notices, judge, map_notices
 from .discretization.error_norms import Compared, Errors, error_norms, missing_mean
-from .discretization.estimate import error_estimate, estimated_squares, why_not_estimated
+from .discretization.estimate import OnRegions, error_estimate, estimated_squares, why_not_estimated
 from .discretization.grouped import BodyMatrix, Law, assemble_body
 from .discretization.on_regions import demand_area, demand_supports
 from .discretization.operator import FormOperator, Operator
@@ -31,6 +31,7 @@ from .discretization.quadrature import GaussRule, operator_rule
 from .discretization.residual import Solved
 from .discretization.space import embedded, longest_edges
 from .discretization.unknowns import Glued, Unknowns, Window
+from .discretization.weak import WeakFace
 from .field import BodyField, FieldOnBody, SplineField
 from .forms.boundary_value_problem import BoundaryValueProblem
 from .forms.mass import Mass
@@ -282,7 +283,7 @@ class System:
 
     def _balance(self, full: Sequence[Array]) -> Balance:
         """Return the balance of a solution."""
-        return balance(self.problem, self.patches, self.unknowns, full, self.matrix.apply(full))
+        return balance(self.problem, self.patches, self.unknowns, self.matrix.faces, full, self.matrix.apply(full))
 
     def _parts(self, full: Sequence[Array]) -> list[Compared]:
         """Return coefficients (c, n_u, n_v, n_w) of each patch with the exact values, zero where none are known."""
@@ -313,7 +314,7 @@ class System:
         if is_wanted and not self._unknown:
             solved, processes = self._solved(full), self.unknowns.processes
             with self.unknowns.agreed(), solved[0].space.agreed():
-                squares = estimated_squares(solved, self.body.interfaces)
+                squares = estimated_squares(solved, self.body.interfaces, list(self._on_regions(full)))
             estimate = error_estimate(processes.total(squares), self._energy(free))
         return errors, estimate
 
@@ -324,20 +325,28 @@ class System:
 
     def _solved(self, full: Sequence[Array]) -> list[Solved]:
         """Return the solution on each patch, of one cube that processes share on their rows."""
+        names: list[list[str]] = [[] for _ in self.patches]
+        for face in self.matrix.weak:
+            for place in face.patches:
+                names[place].append(face.name)
         if self.body.is_single:
-            return [Solved(own.volume, own.space, own.problem, full[0], own.weak) for own in self.patches]
-        weak = dict(zip(self.unknowns.patches, (own.weak for own in self.patches), strict=True))
+            return [Solved(own.volume, own.space, own.problem, full[0], names[0]) for own in self.patches]
+        regions = dict(zip(self.unknowns.patches, names, strict=True))
         return [
-            Solved(one.volume, one.space, one.problem, whole, weak.get(number, ()), number in weak)
+            Solved(one.volume, one.space, one.problem, whole, regions.get(number, ()), number in regions)
             for number, (one, whole) in enumerate(zip(self.stated, self.unknowns.whole(full), strict=True))
         ]
 
+    def _on_regions(self, full: Sequence[Array]) -> Iterator[OnRegions]:
+        """Yield the terms of conditions on regions, with their spaces and the coefficients of their patches."""
+        coefficients = self.matrix.layout.joined(full)
+        for face in self.matrix.weak:
+            yield face, self.patches[face.patches[0]].space, coefficients.of(face.patches)
+
     def _energy(self, free: Array) -> float | None:
         """Return a(u_h, u_h) of free coefficients that solve the system; None where it is not the work of the loads."""
-        given = sum(
-            np.count_nonzero(patch.known) + sum(int(np.count_nonzero(face.values)) for face in patch.weak)
-            for patch in self.patches
-        )
+        given: Any = sum(np.count_nonzero(patch.known) for patch in self.patches)
+        given += sum(np.count_nonzero(face.values) for face in self.matrix.weak)
         total = self.unknowns.processes.total
         if not self.problem.form.symmetric or total(given):
             return None
@@ -437,8 +446,8 @@ def system_of(
     systems = systems_of([patches[number] for number in unknowns.patches], found._replace(known=known))
     components = loads.components
     operators = operators_of(matrix, components)[0] if is_diagonalized(unknowns, components) else ()
-    survey = survey_of(matrix.layout, components, [[own] for own in operators]) if operators else surveyed(matrix)
-    _demand_held(body, problem, systems, unknowns, survey.free, is_loose)
+    survey = survey_of(matrix, [[own] for own in operators]) if operators else surveyed(matrix)
+    _demand_held(body, problem, systems, matrix.weak, unknowns, survey.free, is_loose)
     is_open = all(unknowns.processes.shared(bool(survey.free.all())))
     if is_open and not is_loose and isinstance(systems[0].matrix, FormOperator):
         raise ValueError(
@@ -499,22 +508,24 @@ def _demand_held(
     body: Body,
     problem: BoundaryValueProblem,
     systems: Sequence[PatchSystem],
+    weak: Sequence[WeakFace],
     unknowns: Unknowns,
     free: Mask,
     is_loose: bool,
 ) -> None:
     """Raise ValueError where a region has no area, and where a part of a body that is not loose is free to move.
 
-    free: which of the patches leave a constant free.
+    weak: the terms of conditions on regions. free: which of the patches leave a constant free.
     """
     processes, here = unknowns.processes, dict(zip(unknowns.patches, systems, strict=True))
-    demand_area(problem, [face for system in systems for face in system.weak], processes, body.patches)
+    demand_area(problem, weak, processes, body.patches)
     if is_loose:
         return
     parts = body.parts
     for numbers in parts:
         part = [here[number] for number in numbers if number in here]
-        faces = [face for system in part for face in system.weak]
+        own = np.flatnonzero(np.isin(unknowns.patches, numbers))
+        faces = [face.on(own) for face in weak] if len(parts) > 1 else weak
         named = listed([f"p{number}" for number in numbers])
         try:
             if problem.conditions and not processes.total(sum(len(system.space.dirichlet) for system in part)):

@@ -18,7 +18,7 @@ def rules(volume, text, space=None):
     region, found = Region(text), {}
     for i, name in enumerate(FACE_NAMES):
         axis, side = divmod(i, 2)
-        codes = lambda x, n, name=name: region.holds(x, n, name).astype(np.int64)  # noqa: E731
+        codes = lambda x, n, owners, name=name: region.holds(x, n, name).astype(np.int64)  # noqa: E731
         rule = surface_rule(volume, space or trial_space(volume), axis, side, codes)
         if rule is not None:
             found[name] = rule
@@ -50,7 +50,7 @@ def test_areas_are_right_to_one_in_ten_thousand(text, area, turn):
 
 
 def test_the_points_of_a_part_have_its_code_and_outward_normals():
-    codes = lambda x, n: (x[0] < 0.4).astype(np.int64) + 2 * (x[1] > 0.7)  # noqa: E731
+    codes = lambda x, n, owners: (x[0] < 0.4).astype(np.int64) + 2 * (x[1] > 0.7)  # noqa: E731
     rule = surface_rule(plate(), trial_space(plate()), 2, 1, codes)
     assert rule is not None
     x, y, z = rule.at.x

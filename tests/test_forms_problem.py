@@ -124,7 +124,7 @@ def test_normals_close_up_and_the_flux_of_the_place_is_three_volumes():
     """Gauss: the normal's integral over a closed surface vanishes, that of x . n is three times the volume."""
     volume = benchmark_volume(4)
     rules = [face_rule(volume, trial_space(volume), name) for name in FACE_NAMES]
-    total = sum((rule.normal * rule.measure).sum(axis=(1, 2)) for rule in rules)
+    total = sum((rule.normal * rule.measure).sum(axis=(1, 2, 3)) for rule in rules)
     through = sum(((rule.points * rule.normal).sum(axis=0) * rule.measure).sum() for rule in rules)
     points, weights = np.polynomial.legendre.leggauss(20)
     grid, weights = (points + 1) / 2, weights / 2
@@ -140,13 +140,13 @@ def test_the_term_of_a_robin_face_is_symmetric_and_has_the_face_as_its_sum():
     x, y = np.random.default_rng(0).standard_normal((2, *space.shape))
     products = [np.zeros(space.shape) for _ in range(3)]
     for vector, product in zip((x, y, np.ones(space.shape)), products, strict=True):
-        rule.add_product(vector[None], product[None])
+        rule.add_product(vector[None, None], product[None, None])
     assert np.vdot(y, products[0]) == pytest.approx(np.vdot(x, products[1]))
     assert products[2].sum() == pytest.approx(rule.measure.sum())
     diagonal, unit, column = np.zeros(space.shape), np.zeros(space.shape), np.zeros(space.shape)
-    rule.add_diagonal(0, diagonal)
+    rule.add_diagonal(0, diagonal[None])
     unit[1, -1, 2] = 1.0
-    rule.add_product(unit[None], column[None])
+    rule.add_product(unit[None, None], column[None, None])
     assert diagonal[1, -1, 2] == pytest.approx(column[1, -1, 2])
 
 

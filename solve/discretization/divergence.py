@@ -54,8 +54,8 @@ class Divergence:
                 divergences(source, *where, own.rows, own.weights, total)
 
             own.stack.on_pieces(add)
-        for patch, face in self.faces:
-            face.add_volumes(u[patch], result[patch])
+        for face in self.faces:
+            face.add_volumes(u, result)
         return result
 
     def of_pressure(self, p: OnPatches) -> OnPatches:
@@ -71,19 +71,15 @@ class Divergence:
                 spread_pressures(source, *where, own.rows, own.weights, compliance, total)
 
             own.stack.on_pieces(add)
-        for patch, face in self.faces:
-            face.add_forces(p[patch], result[patch])
+        for face in self.faces:
+            face.add_forces(p, result)
         return result
 
     @cached_property
-    def faces(self) -> "list[tuple[int, HeldFace]]":
-        """Return the faces that hold displacements weakly, with the number of their patch."""
-        found = [(i, face) for i, part in enumerate(self.matrix.parts) for face in part.faces.values()]
-        return [
-            (i, HeldFace(face, np.einsum("cdm,dm->cm", face.held, face.normal)))
-            for i, face in found
-            if isinstance(face, WeakFace) and face.held.any()
-        ]
+    def faces(self) -> "list[HeldFace]":
+        """Return the faces that hold displacements weakly."""
+        held = [face for face in self.matrix.weak if face.held.any()]
+        return [HeldFace(face, np.einsum("cdm,dm->cm", face.held, face.normal)) for face in held]
 
     @cached_property
     def _stacks(self) -> list[_PressedStack]:
@@ -109,22 +105,24 @@ class HeldFace:
     face: WeakFace
     pull: Array
 
-    def add_volumes(self, u: Array, result: Array) -> None:
-        """Add the integrals with each pressure of u (3, n_u, n_v, n_w) to a result (1, n_u, n_v, n_w)."""
-        self.spread((self.pull * self.face.values_of(u)).sum(axis=0)[None], result)
+    def add_volumes(self, u: OnPatches, result: OnPatches) -> None:
+        """Add the integrals with each pressure of u (3, n_u, n_v, n_w) to a result (1, n_u, n_v, n_w) of each patch."""
+        self.spread((self.pull * self.face.values_of(u.of(self.face.patches))).sum(axis=0)[None], result)
 
-    def add_forces(self, p: Array, result: Array) -> None:
-        """Add the integrals with each displacement of p (1, n_u, n_v, n_w) to a result (4, n_u, n_v, n_w)."""
-        self.spread(self.pull * self.face.values_of(p), result[:3])
+    def add_forces(self, p: OnPatches, result: OnPatches) -> None:
+        """Add the integrals with each displacement of p (1, ..) to a result (4, n_u, n_v, n_w) of each patch."""
+        self.spread(self.pull * self.face.values_of(p.of(self.face.patches)), result)
 
-    def add_load(self, result: Array) -> None:
-        """Add the integrals of the given values, n . P g, with each pressure to a result (1, n_u, n_v, n_w)."""
+    def add_load(self, result: OnPatches) -> None:
+        """Add the integrals of the given values, n . P g, with each pressure to a result (1, ..) of each patch."""
         self.spread((self.face.weights * self.face.normal * self.face.values).sum(axis=0)[None], result)
 
-    def spread(self, values: Array, result: Array) -> None:
-        """Add the integrals of values (c, m), with weights, times each function to a result (c, n_u, n_v, n_w)."""
-        target = result[:, *self.face.layers[0]]
-        target += (self.face.tables[0].T @ values.T).T.reshape(target.shape)
+    def spread(self, values: Array, result: OnPatches) -> None:
+        """Add the integrals of values (c, m), with weights, times each function to the first c of a result."""
+        found = np.zeros_like(result.of(self.face.patches))
+        target = np.moveaxis(found[:, : len(values)][:, :, *self.face.layers[0]], 1, -1)  # (k, n_b, n_c, c)
+        target += (self.face.tables[0].T @ values.T).reshape(target.shape)
+        result.add(self.face.patches, found)
 
 
 def _weights(stack: PatchStack) -> Weights:

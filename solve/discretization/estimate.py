@@ -24,18 +24,22 @@ from .space import TrialSpace
 from .waves import Directions, Waves, wave_lengths
 from .weak import WeakFace
 
+OnRegions = tuple[WeakFace, TrialSpace, Array]  # terms on faces, with the space and the coefficients of their patches
 
-def estimated_squares(patches: Sequence[Solved], interfaces: Sequence[Interface] = ()) -> Array:
+
+def estimated_squares(
+    patches: Sequence[Solved], interfaces: Sequence[Interface] = (), on_regions: Sequence[OnRegions] = ()
+) -> Array:
     """Return the squared norms (3,) of the estimated error, of its energy norm, and of the solution.
 
-    They are those over the patches of this process; the squares of all processes are summed.
+    on_regions: the terms of conditions on regions of a body, with the solution's coefficients on their patches. They
+    are those over the patches of this process; the squares of all processes are summed.
     """
     parts, glued = smooth_parts(patches, interfaces)
     waves = [Waves.of(residual, is_body=bool(glued)) for residual in residuals_of(parts)]
     own = [one for one in waves if one.residual.is_own]
     squares = chain(*map(_inside, own), *map(_on_outer_faces, own), _at_interfaces(waves, glued))
-    on_regions = chain.from_iterable(map(_on_regions, patches)) if glued else ()
-    return np.asarray(sum(chain(squares, on_regions), np.zeros(3)))
+    return np.asarray(sum(chain(squares, map(_on_regions, on_regions) if glued else ()), np.zeros(3)))
 
 
 def error_estimate(squares: Array, energy: float | None = None) -> Errors:
@@ -132,7 +136,7 @@ def _on_outer_faces(waves: Waves) -> Iterator[Array]:
     for face in FACE_NAMES:
         alike = defaultdict(list)
         for place, patch in enumerate(patches):
-            if has_face(patch.space, face) and not patch.has_regions(face):
+            if has_face(patch.space, face) and face not in patch.regions:
                 alike[patch.problem.key_on(face)].append(place)
         for places in map(np.array, alike.values()):
             problem, here = patches[places[0]].problem, waves.residual.on_face(face, places)
@@ -223,31 +227,30 @@ def _behind(squares: Array, resistance: Array, depth: Array, has_area: Mask) -> 
     return np.array(found)
 
 
-def _on_regions(patch: Solved) -> Iterator[Array]:
-    """Yield the squared norms (3,) of the error and of its energy norm that come from conditions on regions.
+def _on_regions(held: OnRegions) -> Array:
+    """Return the squared norms (3,) of the error and of its energy norm that come from conditions on regions.
 
     A region covers parts of spans. What is left of its residual on a part of a span without its mean counts as the
     slowest of the waves along the face.
     """
-    form, space = patch.problem.form, patch.space
-    for face in patch.weak:
-        u, flux = face.traces(patch.coefficients)
-        free = np.eye(form.components)[:, :, None] - face.projector
-        missing = face.loads - np.einsum("cdm,dm->cm", free, face.factor * u + flux)
-        lack = face.values - np.einsum("cdm,dm->cm", face.projector, u)
-        cells, one, other = _cells(space, face)
-        across = _across(form, face.normal, face.x)
-        waves = (one, other, one + other, one - other)
-        factor = np.min([form.symbol(wave, face.x) for wave in waves], axis=0)
-        depth, resistance = 0.5 * np.sqrt(across / factor), np.sqrt(factor * across)
-        squares, held = (face.weights * _without_means(part, cells, face.weights) for part in (missing, lack))
-        error = float((depth * (squares / resistance**2 + held)).sum())
-        yield np.array([error, float((squares / resistance).sum()), 0.0])
+    face, space, coefficients = held
+    form, (u, flux) = face.form, face.traces(coefficients)
+    free = np.eye(form.components)[:, :, None] - face.projector
+    missing = face.loads - np.einsum("cdm,dm->cm", free, face.factor * u + flux)
+    lack = face.values - np.einsum("cdm,dm->cm", face.projector, u)
+    cells, one, other = _cells(space, face)
+    across = _across(form, face.normal, face.x)
+    waves = (one, other, one + other, one - other)
+    factor = np.min([form.symbol(wave, face.x) for wave in waves], axis=0)
+    depth, resistance = 0.5 * np.sqrt(across / factor), np.sqrt(factor * across)
+    squares, lacking = (face.weights * _without_means(part, cells, face.weights) for part in (missing, lack))
+    error = float((depth * (squares / resistance**2 + lacking)).sum())
+    return np.array([error, float((squares / resistance).sum()), 0.0])
 
 
 def _cells(space: TrialSpace, face: WeakFace) -> tuple[IntArray, Array, Array]:
-    """Return the span (m,) of each point of a face, and the waves (3, m) of one period a span along the face."""
-    cells, waves = np.zeros(len(face.weights), dtype=np.int64), []
+    """Return the span (m,) of each point of faces, and the waves (3, m) of one period a span along the face."""
+    cells, waves = face.owners, []
     for axis in (a for a in range(3) if a != face.axis):
         breaks, lengths = space.breaks[axis], wave_lengths(space.knots[axis], space.degrees[axis])
         span = np.clip(np.searchsorted(breaks, face.places[:, axis], side="right") - 1, 0, len(lengths) - 1)

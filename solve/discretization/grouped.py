@@ -18,10 +18,11 @@ from parameterize.spline.volume import BSplineVolume
 from ..forms.form import Form
 from . import group_kernels, lane_kernels
 from .groups import CoefficientLayout, OnPatches
-from .operator import Source, assemble_stack, multiply_law
+from .operator import FaceTerm, Source, assemble_stack, multiply_law
 from .quadrature import GaussRule
 from .space import TrialSpace
 from .stack import PatchStack, Piece, Stacked, stacks_of
+from .weak import WeakFace
 
 
 class Law(NamedTuple):
@@ -80,8 +81,9 @@ class StackMatrix:
 class BodyMatrix:
     """Apply the matrices of all patches of a body.
 
-    parts: the matrix of each patch, with the terms on its faces; what they store at the points is part of the stacks.
-    alone: the numbers of the patches that are in no stack, because no other patch has their shape.
+    parts: the matrix of each patch; what they store at the points is part of the stacks. alone: the numbers of the
+    patches that are in no stack, because no other patch has their shape. faces: the terms on faces, those of patches
+    that are alike as one; the part of a patch alone has its own ones, too.
     """
 
     layout: CoefficientLayout
@@ -89,6 +91,7 @@ class BodyMatrix:
     parts: Sequence[Any]  # MatrixFree
     stacks: Sequence[StackMatrix]
     alone: Sequence[int]
+    faces: Sequence[FaceTerm] = ()
 
     def apply(self, coefficients: Sequence[Array]) -> OnPatches:
         """Return the products (c, n_u, n_v, n_w) with all coefficients of each patch, fixed ones included."""
@@ -107,7 +110,7 @@ class BodyMatrix:
         self._add_stacked_faces(coefficients, result)
         for patch in self.alone:
             for face in self.parts[patch].faces.values():
-                face.add_product(coefficients[patch], result[patch])
+                face.add_product(coefficients[patch][None], result[patch][None])
 
     def _add_stacked_faces(self, coefficients: OnPatches, result: OnPatches) -> None:
         if self._of_faces.nnz:
@@ -115,19 +118,28 @@ class BodyMatrix:
 
     @cached_property
     def _of_faces(self) -> csr_array:
-        return self.faces_of(sorted(set(range(len(self.parts))) - set(self.alone)))
+        return self.matrix_of(self.shared_faces)
 
-    def faces_of(self, patches: Sequence[int]) -> csr_array:
-        """Return the matrix of the terms on faces of some patches, of all coefficients of all patches as one vector."""
+    @property
+    def weak(self) -> list[WeakFace]:
+        """Return the terms of conditions on regions."""
+        return [face for face in self.faces if isinstance(face, WeakFace)]
+
+    @property
+    def shared_faces(self) -> list[FaceTerm]:
+        """Return the terms on faces that are in no part."""
+        return [face for face in self.faces if not _is_of_one(face, self.alone)]
+
+    def matrix_of(self, faces: Sequence[FaceTerm]) -> csr_array:
+        """Return the matrix of terms on faces, of all coefficients of all patches as one vector."""
         components, starts = self.laws[0].form.components, self.layout.starts
-        terms = [(i, face) for i in patches for face in self.parts[i].faces.values()]
-        found = [(components * starts[i], face.matrix((components, *self.layout.shapes[i]))) for i, face in terms]
-        rows, columns = (
-            np.concatenate([np.zeros(0, dtype=np.int64), *(first + own.coords[axis] for first, own in found)])
-            for axis in (0, 1)
-        )
-        values = np.concatenate([np.zeros(0), *(own.data for _, own in found)])
-        return coo_array((values, (rows, columns)), shape=(components * starts[-1],) * 2).tocsr()
+        found: csr_array = csr_array((components * starts[-1],) * 2)
+        for face in faces:
+            shape = components, *self.layout.shapes[face.patches[0]]
+            own, size = face.matrix(shape), math.prod(shape)
+            places = [components * starts[face.patches[row // size]] + row % size for row in own.coords]
+            found = found + coo_array((own.data, places), shape=found.shape).tocsr()
+        return found
 
     @property
     def every_stack(self) -> list[tuple[PatchStack, int, IntArray]]:
@@ -137,9 +149,13 @@ class BodyMatrix:
         each = [(k, one) for k, group in enumerate(groups) for one in stacks_of(group, threads)]
         return [(stack, k, np.array(places)) for k, (places, stack) in each]
 
-    def with_faces(self, faces: Sequence[dict[str, Any]]) -> "BodyMatrix":
-        """Return the same matrix with terms on faces of each patch."""
-        return replace(self, parts=[replace(own, faces=more) for own, more in zip(self.parts, faces, strict=True)])
+    def with_faces(self, faces: Sequence[FaceTerm]) -> "BodyMatrix":
+        """Return the same matrix with terms on faces."""
+        parts = list(self.parts)
+        for patch in self.alone:
+            own = {face.name: face for face in faces if _is_of_one(face, [patch])}
+            parts[patch] = replace(parts[patch], faces=own) if own else parts[patch]
+        return replace(self, parts=parts, faces=faces)
 
     def of(self, laws: Sequence[Law]) -> "BodyMatrix":
         """Return the matrix of other laws on the same patches, without terms on faces."""
@@ -149,7 +165,8 @@ class BodyMatrix:
         """Return the symmetric part of a component's diagonal block, for its own gradient and value."""
         found = self.of([law._replace(source=None, component=component) for law in self.laws])
         both = zip(found.parts, self.parts, strict=True)
-        return replace(found, parts=[replace(block, faces=own.faces, component=component) for block, own in both])
+        parts = [replace(block, faces=own.faces, component=component) for block, own in both]
+        return replace(found, parts=parts, faces=self.faces)
 
 
 def assemble_body(layout: CoefficientLayout, laws: Sequence[Law], threads: int) -> tuple[BodyMatrix, OnPatches]:
@@ -170,6 +187,11 @@ def assemble_body(layout: CoefficientLayout, laws: Sequence[Law], threads: int) 
             matrices = np.stack(list(map(law_of, forms))) if is_constant else None
             stacks.append(StackMatrix(stack, number, np.array(places), forms, stored, matrices))
     return BodyMatrix(layout, laws, parts, stacks, alone), loads
+
+
+def _is_of_one(face: FaceTerm, patches: Sequence[int]) -> bool:
+    """Return whether a term is that of one patch, which is one of these."""
+    return len(face.patches) == 1 and face.patches[0] in patches
 
 
 def _stacked(law: Law) -> Stacked:

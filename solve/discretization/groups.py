@@ -48,6 +48,14 @@ class CoefficientLayout:
         starts[order], starts[-1] = ends - sizes[order], ends[-1]
         return starts
 
+    @cached_property
+    def places(self) -> tuple[IntArray, IntArray]:
+        """Return the group (patches,) of each patch, and its place (patches,) there."""
+        of, place = np.empty((2, len(self.shapes)), dtype=np.int64)
+        for number, group in enumerate(self.groups):
+            of[list(group)], place[list(group)] = number, np.arange(len(group))
+        return of, place
+
     def empty(self, components: int) -> "OnPatches":
         """Return zero on all patches."""
         return OnPatches(self, components, np.zeros(components * self.starts[-1]))
@@ -111,6 +119,20 @@ class OnPatches(Sequence[Array]):
         for group in self.layout.groups:
             shape = (len(group), self.components, *self.layout.shapes[group[0]])
             yield self._from(self.layout.starts[group[0]], shape)
+
+    def of(self, patches: IntArray) -> Array:
+        """Return a copy (k, c, n_u, n_v, n_w) of the arrays of some patches of one group."""
+        group, places = self._of_group(patches)
+        return group[places]
+
+    def add(self, patches: IntArray, values: Array) -> None:
+        """Add to the arrays of some patches of one group values (k, c, n_u, n_v, n_w)."""
+        group, places = self._of_group(patches)
+        group[places] += values
+
+    def _of_group(self, patches: IntArray) -> tuple[Array, IntArray]:
+        groups, places = self.layout.places
+        return list(self.in_groups)[groups[patches[0]]], places[patches]
 
     def _from(self, start: int, shape: tuple[int, ...]) -> Array:
         first = self.components * start

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections import defaultdict
+from collections.abc import Hashable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from scipy.sparse import csr_array
@@ -13,15 +14,18 @@ from parameterize.arrays import Array, IntArray, in_brackets
 from parameterize.spline.body import all_control_points, size_of
 from parameterize.spline.bspline import basis_derivatives, breakpoints, sparse_rows
 from parameterize.spline.interface import axis_side
+from parameterize.spline.orientation import orientations
+from parameterize.spline.patch_groups import groups_of
 from parameterize.spline.volume import FACE_NAMES, BSplineVolume
 
-from ..field import Points
+from ..field import Points, part_of
 from ..forms.boundary_value_problem import BoundaryValueProblem
 from ..forms.conditions import Condition, Value
+from ..forms.region import FacesOfPoints, tolerances
 from .face_data import has_face
 from .processes import Processes
 from .space import TrialSpace
-from .surface_rule import SurfaceRule, surface_rule
+from .surface_rule import Codes, Faces, SurfaceRule, surface_rules
 from .weak import WeakFace
 
 Patches = Sequence[BSplineVolume]
@@ -37,31 +41,80 @@ SLIDES = 1e-10  # share of the mean square of a motion that supports hold, up to
 WHOLE = 0.999  # share of a face's parameters that a region must cover to count as all of it
 
 
-def weak_faces(volume: BSplineVolume, problem: BoundaryValueProblem, space: TrialSpace) -> list[WeakFace]:
-    """Return the terms of a problem's conditions on regions, one entry a face on which conditions act.
+class Stated(Protocol):
+    """Describe a problem on one patch of a body: its volume, the problem with the patch's data, and the trial space."""
 
-    Raises ValueError where conditions contradict each other, also on faces that the trial space holds.
+    @property
+    def volume(self) -> BSplineVolume:
+        """Return the map."""
+
+    @property
+    def problem(self) -> BoundaryValueProblem:
+        """Return the problem with the data of the patch."""
+
+    @property
+    def space(self) -> TrialSpace:
+        """Return the trial space."""
+
+
+def weak_faces(patches: Sequence[Stated], same: Sequence[Hashable]) -> list[WeakFace]:
+    """Return the terms of the conditions on regions of problems, those on faces of patches that are alike as one.
+
+    same: equal for patches with the same law. Raises ValueError where conditions contradict each other, also on faces
+    that the trial space holds.
     """
-    if len(problem.conditions) > MOST:
-        raise ValueError(f"at most {MOST} regions, got {len(problem.conditions)}")
-    regions = [condition.region for condition in problem.conditions]
-    needs_normal, frames = any(one.needs_normal for one in regions), [one.frame for one in regions]
-    length = next((frame.length for frame in frames if frame is not None), None)
+    conditions = patches[0].problem.conditions
+    if len(conditions) > MOST:
+        raise ValueError(f"at most {MOST} regions, got {len(conditions)}")
+    groups = groups_of([patch.volume for patch in patches])
     found = []
-    for name in FACE_NAMES:
-        strong = problem.strong_on(name) if name in space.dirichlet else None
-        if not has_face(space, name) or strong is not None and not _may_overlap(problem, name, strong):
-            continue
-        axis, side = axis_side(name)
-        rule = surface_rule(volume, space, axis, side, _coder(problem, name, strong), length, needs_normal)
-        if rule is None:
-            continue
-        builder = _Builder(volume, problem, space, name, rule)
-        if strong is None:
-            found.append(builder.face())
-        else:
-            builder.demand_consistent()
+    for group in groups:
+        hands = orientations(group)
+        for name in FACE_NAMES:
+            axis, side = axis_side(name)
+            for places, strong in _alike([patches[i] for i in group.numbers], [same[i] for i in group.numbers], name):
+                faces = Faces(group.rows(places), axis, side, hands[places])
+                own = [patches[i] for i in faces.group.numbers]
+                face = _weak_face(own, faces, name, strong)
+                found += [] if face is None else [face]
     return found
+
+
+def _alike(patches: Sequence[Stated], same: Sequence[Hashable], name: str) -> Iterator[tuple[IntArray, Value | None]]:
+    """Yield the places of patches whose faces of a name are cut at once, and the condition that their spaces hold."""
+    found = defaultdict[Any, list[int]](list)
+    for place, (patch, law) in enumerate(zip(patches, same, strict=True)):
+        problem, space = patch.problem, patch.space
+        if name not in space.outer:
+            continue
+        strong = problem.strong_on(name) if name in space.dirichlet else None
+        if strong is None or _may_overlap(problem, name, strong):
+            knots = (row.tobytes() for row in space.knots)
+            held = None if strong is None else strong.role
+            found[space.degrees, *knots, law, problem.on_regions, held].append(place)
+    for places in found.values():
+        first = patches[places[0]]
+        if has_face(first.space, name):
+            strong = first.problem.strong_on(name) if name in first.space.dirichlet else None
+            yield np.array(places), strong
+
+
+def _weak_face(patches: Sequence[Stated], faces: Faces, name: str, strong: Value | None) -> WeakFace | None:
+    """Return the terms on faces of patches that are alike; None where no condition acts, or the spaces hold them."""
+    problem, space = patches[0].problem, patches[0].space
+    regions = [condition.region for condition in problem.conditions]
+    length = next((one.frame.length for one in regions if one.frame is not None), None)
+    coder = _coder(problem, faces, [patch.problem.prefix + name for patch in patches], strong)
+    rule = surface_rules(faces, space, coder, length, any(one.needs_normal for one in regions))
+    if rule is None:
+        return None
+    present, owners = np.unique(rule.at.owners, return_inverse=True)
+    rule = replace(rule, at=replace(rule.at, owners=owners))
+    builder = _Builder(faces.rows(present), problem, space, name, rule)
+    if strong is None:
+        return builder.face()
+    builder.demand_consistent()
+    return None
 
 
 def _may_overlap(problem: BoundaryValueProblem, name: str, strong: Value) -> bool:
@@ -135,18 +188,20 @@ def _unheld(moved: Array, held: Array) -> Array | None:
     return np.asarray(scaled @ turned[:, 0]) if shares[0] <= SLIDES else None
 
 
-def _coder(problem: BoundaryValueProblem, name: str, strong: Value | None) -> Callable[[Array, Array], Any]:
-    """Return the function from points and normals to codes: bit i where condition i holds, bit 0 for the exact flux.
+def _coder(problem: BoundaryValueProblem, faces: Faces, names: Sequence[str], strong: Value | None) -> Codes:
+    """Return the function from points to codes: bit i where condition i holds, bit 0 for the exact flux.
 
-    strong: the condition that the trial space holds on the face, if any; codes are zero where it is alone.
+    names: (k,), of the faces in the body. strong: the condition that the trial space holds on the faces, if any; codes
+    are zero where it is alone.
     """
     rest = int(bool(problem.exact_formulas) and strong is None)
     alone = sum(1 << i for i, condition in enumerate(problem.conditions, 1) if condition is strong)
+    near = tolerances(faces.nets)
 
-    def codes(x: Array, normal: Array) -> Any:
-        found = np.full(x.shape[1:], rest, dtype=np.int64)
+    def codes(x: Array, normal: Array, owners: IntArray) -> IntArray:
+        found, on = np.full(x.shape[1:], rest, dtype=np.int64), FacesOfPoints(names, owners, near[owners])
         for i, condition in enumerate(problem.conditions, 1):
-            found |= condition.region.holds(x, normal, problem.prefix + name).astype(np.int64) << i
+            found |= condition.region.holds_on(x, normal, on).astype(np.int64) << i
         return found if strong is None else np.where(found == alone, 0, found)
 
     return codes
@@ -172,10 +227,6 @@ class _Acting:
     def _holding(self, condition: int) -> Any:
         return self.codes >> (condition + 1) & 1 == 1
 
-    def _part(self, points: Any) -> Points:
-        assert self.x.places is not None
-        return Points.at(np.ascontiguousarray(self.x[:, points]), self.x.places[points])
-
     def held(self) -> tuple[Array, Array]:
         """Return the projector P (c, c, m) onto the directions along which u is given, and P g (c, m)."""
         c, m = self.problem.form.components, len(self.weights)
@@ -184,7 +235,7 @@ class _Acting:
             here = np.flatnonzero(self._holding(i))
             if not isinstance(condition, Value) or not len(here):
                 continue
-            points = self._part(here)
+            points = part_of(self.x, here)
             for direction in condition.directions(c, self.normal[:, here]):
                 value = condition.values_along(direction, self.problem, points)
                 new = direction - np.einsum("cdm,dm->cm", projector[:, :, here], direction)
@@ -225,7 +276,7 @@ class _Acting:
             named[here] = True
             if condition.is_essential or not len(here):
                 continue
-            points = self._part(here)
+            points = part_of(self.x, here)
             found = condition.flux_at(self.problem, points, self.normal[:, here])
             lost = np.abs(np.einsum("cdm,dm->cm", projector[:, :, here], found)).max(axis=0)
             wrong = here[lost > CONTRADICTION * np.abs(found).max()]
@@ -236,7 +287,7 @@ class _Acting:
                 factor[here] += condition.factor_at(points)
         rest = np.flatnonzero((self.codes & 1 == 1) & ~named | self._partly_held(projector, named))
         if self.problem.exact_formulas and len(rest):
-            points = self._part(rest)
+            points = part_of(self.x, rest)
             loads[:, rest] += self.problem.exact_flux("flux", points, self.normal[:, rest])
         free = np.eye(self.problem.form.components)[:, :, None] - projector
         return np.einsum("cdm,dm->cm", free, loads), factor
@@ -260,7 +311,7 @@ class _Acting:
 
 @dataclass(frozen=True, eq=False)
 class _Builder:
-    volume: BSplineVolume
+    faces: Faces
     problem: BoundaryValueProblem
     space: TrialSpace
     name: str
@@ -282,14 +333,17 @@ class _Builder:
         form, at, weights, acting = self.problem.form, self.rule.at, self.rule.weights, self._acting
         x, normal = acting.x, acting.normal
         projector, given = acting.held()
-        gamma, slowest = self._gamma(x, normal)
+        gamma, slowest = self._gamma(x, normal, np.flatnonzero(projector.any(axis=(0, 1))))
         loads, factor = acting.natural(projector)
         axis, side = axis_side(self.name)
         tables, slope = self._tables(axis, side)
         ends = [tuple(-end if a == axis else slice(None) for a in range(3)) for end in ((1, 2) if side else (0, -1))]
         inside = np.einsum("ccm->m", projector) > 0.5
+        held = np.bincount(at.owners, inside * weights / at.size, len(self.faces))
         return WeakFace(
             name=self.name,
+            patches=self.faces.group.numbers,
+            owners=at.owners,
             form=form,
             x=x,
             normal=normal,
@@ -302,46 +356,54 @@ class _Builder:
             slowest=slowest,
             factor=factor,
             loads=loads,
-            is_whole=bool((weights[inside] / at.size[inside]).sum() > WHOLE),
+            is_whole=held > WHOLE,
             tables=tables,
             slope=slope,
             layers=(ends[0], ends[1]),
         )
 
-    def _gamma(self, x: Points, normal: Array) -> tuple[Array, Array]:
+    def _gamma(self, x: Points, normal: Array, held: IntArray) -> tuple[Array, Array]:
         """Return Nitsche's parameter (m,) at points with normals (3, m), and the law's factor over the cube's depth.
 
-        On the span behind a face |t(u)|^2 integrates to at most (p + 1)^2 / thickness times the energy, times the
-        largest eigenvalue of the law's matrix n . C . n (a polynomial of degree p on [0, 1] has f(0)^2 <= (p + 1)^2 int
-        f^2), times a factor for the map's change across the span.
+        held: the points with given values; the others have zero. On the span behind a face |t(u)|^2 integrates to at
+        most (p + 1)^2 / thickness times the energy, times the largest eigenvalue of the law's matrix n . C . n (a
+        polynomial of degree p on [0, 1] has f(0)^2 <= (p + 1)^2 int f^2), times a factor for the map's change across
+        the span.
         """
         at, (axis, side) = self.rule.at, axis_side(self.name)
-        strength = np.linalg.eigvalsh(self.problem.form.matrix_along(normal, x))[..., -1]
+        gamma, slowest = np.zeros((2, len(at.owners)))
+        if not len(held):
+            return gamma, slowest
+        law = self.problem.form.matrix_along(normal[:, held], part_of(x, held))
+        strength = np.linalg.eigvalsh(law)[..., -1]
         breaks = breakpoints(self.space.whole.knots[axis])
         span = breaks[-1] - breaks[-2] if side else breaks[1] - breaks[0]
-        thickness = span * np.abs(np.linalg.det(at.jacobian)) / at.size
-        steepest = MARGIN * self._sharing() * (self.space.degrees[axis] + 1) ** 2 * self._change(axis, side, span)
-        return steepest * strength / thickness, strength * span / thickness
+        thickness = span * np.abs(np.linalg.det(at.jacobian[held])) / at.size[held]
+        change = self._change(held, span)
+        steepest = MARGIN * self._sharing(held) * (self.space.degrees[axis] + 1) ** 2 * change
+        gamma[held], slowest[held] = steepest * strength / thickness, strength * span / thickness
+        return gamma, slowest
 
-    def _change(self, axis: int, side: int, span: float) -> Array:
-        """Return the factor (m,) by which the map may lower the energy inside the span behind each point."""
-        at, change = self.rule.at, np.ones(len(self.rule.weights))
-        inverse, det = np.linalg.inv(at.jacobian), np.abs(np.linalg.det(at.jacobian))
+    def _change(self, points: IntArray, span: float) -> Array:
+        """Return the factor (m,) by which the map may lower the energy inside the span behind some points."""
+        at, (axis, side) = self.rule.at, axis_side(self.name)
+        jacobian, change = at.jacobian[points], np.ones(len(points))
+        inverse, det = np.linalg.inv(jacobian), np.abs(np.linalg.det(jacobian))
         for depth in DEPTHS:
-            parameters = at.parameters.copy()
+            parameters = at.parameters[points]
             parameters[:, axis] = 1.0 - depth * span if side else depth * span
-            inside = self.volume.jacobian(parameters)
+            inside = self.faces.jacobian(at.owners[points], parameters)
             stretch = np.linalg.norm(inside @ inverse, ord=2, axis=(1, 2)) ** 2
             change = np.maximum(change, stretch * det / np.abs(np.linalg.det(inside)))
         return change
 
-    def _sharing(self) -> Array:
-        """Return the number (m,) of faces that share the energy of the span behind each point."""
+    def _sharing(self, points: IntArray) -> Array:
+        """Return the number (m,) of faces that share the energy of the span behind some points."""
         axis = FACE_NAMES.index(self.name) // 2
-        count = np.ones(len(self.rule.weights))
+        count = np.ones(len(points))
         for a in range(3):
             if a != axis:
-                breaks, t = breakpoints(self.space.whole.knots[a]), self.rule.at.parameters[:, a]
+                breaks, t = breakpoints(self.space.whole.knots[a]), self.rule.at.parameters[points, a]
                 count += (t < breaks[1]).astype(float) + (t > breaks[-2])
         return count
 
@@ -352,12 +414,17 @@ class _Builder:
         found = [basis_derivatives(knots[a], degrees[a], self.rule.at.parameters[:, a], derivatives=1) for a in along]
         (first_b, b), (first_c, c) = found
         count_b, count_c = (self.space.shape[a] for a in along)
+        first_b = first_b + self.rule.at.owners * count_b
         columns = (
             (first_b[:, None] + np.arange(b.shape[-1]))[:, :, None] * count_c
             + (first_c[:, None] + np.arange(c.shape[-1]))[:, None, :]
         ).reshape(len(first_b), -1)
         tables = [
-            sparse_rows((b[i][:, :, None] * c[j][:, None, :]).reshape(len(columns), -1), columns, count_b * count_c)
+            sparse_rows(
+                (b[i][:, :, None] * c[j][:, None, :]).reshape(len(columns), -1),
+                columns,
+                len(self.faces) * count_b * count_c,
+            )
             for i, j in ((0, 0), (1, 0), (0, 1))
         ]
         _, ends = basis_derivatives(knots[axis], degrees[axis], np.array([float(side)]), derivatives=1)

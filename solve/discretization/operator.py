@@ -31,25 +31,36 @@ ONE = np.zeros(1, dtype=np.int64)  # the number of the patch of a stack of one
 
 
 class FaceTerm(Protocol):
-    """Define terms of a matrix that are integrals over the image of a face."""
+    """Define terms of a matrix that are integrals over the images of faces of one name of k patches of one shape."""
+
+    @property
+    def name(self) -> str:
+        """Return the name of the faces."""
+
+    @property
+    def patches(self) -> IntArray:
+        """Return the numbers (k,) of the patches."""
 
     def add_product(self, coefficients: Array, result: Array) -> None:
-        """Add the product of the terms and coefficients (c, n_u, n_v, n_w) to a result of the same shape."""
+        """Add the product of the terms and coefficients (k, c, n_u, n_v, n_w) to a result of the same shape."""
 
     def matrix(self, shape: tuple[int, ...]) -> coo_array:
-        """Return the matrix of the terms for coefficients of a shape (c, n_u, n_v, n_w) as a vector."""
+        """Return the matrix of the terms for coefficients of a shape (c, n_u, n_v, n_w) of each patch, as one vector.
+
+        The k patches come one after another.
+        """
 
     def add_diagonal(self, component: int, diagonal: Array) -> None:
-        """Add the diagonal of a component's block to an array (n_u, n_v, n_w)."""
+        """Add the diagonal of a component's block to an array (k, n_u, n_v, n_w)."""
 
     def add_lumped(self, component: int, diagonal: Array, share: float = 1.0) -> None:
-        """Add the integral of the factor of u . v with each function to an array (n_u, n_v, n_w).
+        """Add the integral of the factor of u . v with each function to an array (k, n_u, n_v, n_w).
 
         share: of Nitsche's factor that counts where values are held weakly.
         """
 
-    def stiffness(self, component: int) -> float:
-        """Return the integral of the factor of u . v for one component, the mean over the face's parameters."""
+    def stiffness(self, component: int) -> Array:
+        """Return the integrals (k,) of the factor of u . v for one component, means over the faces' parameters."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,7 +68,8 @@ class MatrixFree:
     """Apply a matrix that is never assembled to coefficients (c, n_u, n_v, n_w), or (n_u, n_v, n_w) for one component.
 
     threads: the number of threads of a product. folded: the number of points of all processes where det J has the wrong
-    sign. faces: the terms on the faces of the cube over which this process integrates.
+    sign. faces: the terms on the faces of the cube over which this process integrates; those on faces of several
+    patches, which are in one term, are part of the body's matrix alone.
     """
 
     space: TrialSpace
@@ -90,7 +102,7 @@ class MatrixFree:
         result = np.zeros_like(source)
         self.on_planes(lambda points: self._multiply(points, source, result))
         for face in self.faces.values():
-            face.add_product(source, result)
+            face.add_product(source[None], result[None])
         return result.reshape(coefficients.shape)
 
     def apply_free(self, free: Array) -> Array:
@@ -139,7 +151,7 @@ def diagonals(operators: Sequence[Operator]) -> list[Array]:
         for number, result in zip(numbers, stack.diagonals(factors), strict=True):
             on_faces = np.zeros(result.shape)
             for face in operators[number].faces.values():
-                face.add_diagonal(operators[number].component, on_faces)
+                face.add_diagonal(operators[number].component, on_faces[None])
             found[number] = result + on_faces if operators[number].faces else result
     return found
 

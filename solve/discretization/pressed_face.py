@@ -15,7 +15,7 @@ class PressedFace(WeakFace):
 
     @classmethod
     def of(cls, face: WeakFace, p: Array) -> "PressedFace":
-        """Return a face under the pressure with coefficients p (1, n_u, n_v, n_w)."""
+        """Return a face under the pressure with coefficients p (k, 1, n_u, n_v, n_w)."""
         own = {field.name: getattr(face, field.name) for field in fields(WeakFace)}
         return cls(**own, pressure=face.values_of(p)[0])
 

@@ -8,7 +8,7 @@ Patches with equal knots, law and data are a group, whose arrays are one: a `Res
 """
 
 from collections import defaultdict
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -26,7 +26,6 @@ from ..forms.form import Form, strong_form
 from ..forms.jets import PAIRS, SYMMETRIC, Jet
 from .quadrature import gauss_rule
 from .space import TrialSpace
-from .weak import WeakFace
 
 POINTS = 2**15  # of a piece of patches: the arrays of its jets stay small
 FIRST = UNITS
@@ -40,21 +39,17 @@ Ends = tuple[float, float]
 class Solved:
     """Hold a solution on a patch, or on a part of one between knots at which its space is only continuous.
 
-    coefficients: (c, n_u, n_v, n_w). weak: the faces on which conditions on regions act. is_own: whether this process
-    integrates over it. ends: the parameters of the patch at which a part begins and ends.
+    coefficients: (c, n_u, n_v, n_w). regions: the names of the faces on which conditions on regions act. is_own:
+    whether this process integrates over it. ends: the parameters of the patch at which a part begins and ends.
     """
 
     volume: BSplineVolume
     space: TrialSpace
     problem: BoundaryValueProblem
     coefficients: Array
-    weak: Sequence[WeakFace] = ()
+    regions: Collection[str] = ()
     is_own: bool = True
     ends: tuple[Ends, Ends, Ends] = ((0.0, 1.0),) * 3
-
-    def has_regions(self, face: str) -> bool:
-        """Return whether conditions on regions act on a face."""
-        return any(one.name == face for one in self.weak)
 
 
 @dataclass(frozen=True, eq=False)

@@ -65,4 +65,6 @@ def _divided_at(patch: Solved, cuts: Sequence[Array]) -> Iterator[Solved]:
             tuple(name for name in whole.outer if name in at_ends),
         )
         coefficients = patch.coefficients[:, *(part for part, _ in rows)]
-        yield Solved(volume, space, patch.problem, coefficients, patch.weak, patch.is_own, (ends[0], ends[1], ends[2]))
+        yield Solved(
+            volume, space, patch.problem, coefficients, patch.regions, patch.is_own, (ends[0], ends[1], ends[2])
+        )

@@ -1,26 +1,27 @@
-"""Integrates on the image of a face of the cube whose parts end between knots, as regions do.
+"""Integrates on the images of faces of the cube whose parts end between knots, as regions do.
 
-Every point has a code, which says to which regions it belongs. A cell (at first a span) on which the code is constant
-has Gauss points. Any other cell is cut into lines along one of its directions, the jumps of the code on each line are
-found by bisection, and every piece between two jumps has Gauss points. Where all lines of a cell meet the rim in the
-same way, this is exact to high order; where the rim ends or bends between lines, the cell is halved.
+The faces of one name of many patches are cut at once, if the patches have equal degrees and knots. Every point has a
+code, which says to which regions it belongs. A cell (at first a span) on which the code is constant has Gauss points.
+Any other cell is cut into lines along one of its directions, the jumps of the code on each line are found by bisection,
+and every piece between two jumps has Gauss points. Where all lines of a cell meet the rim in the same way, this is
+exact to high order; where the rim ends or bends between lines, the cell is halved.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
-from parameterize.arrays import Array, IntArray
-from parameterize.spline.orientation import orientation
+from parameterize.arrays import Array, Floats, IntArray, Mask
+from parameterize.spline.orientation import orientations
+from parameterize.spline.patch_groups import PatchGroup, group_of
+from parameterize.spline.spline_stack import SplineStack
 from parameterize.spline.volume import BSplineVolume
 
 from .space import TrialSpace
 
-Mask = NDArray[np.bool_]
-Codes = Callable[[Array, Array], IntArray]  # of points (3, m) and outward unit normals (3, m)
+Codes = Callable[[Array, Array, IntArray], IntArray]  # of points (3, m), outward unit normals (3, m), and faces (m,)
 
 SAMPLES = 5  # points a direction at which a cell's code is evaluated, its ends included
 FEWEST = 120  # of these a direction on a face of a body of one cube, so that few spans are sampled as finely as many
@@ -29,29 +30,86 @@ BISECTIONS = 20
 TOLERANCE = 1e-4  # share of the area of a face's regions by which it may be wrong
 SPREAD = 0.05  # of a cell in which lines differ, its usual error; these are of either sign
 HALVINGS = 8  # of such cells, at most
-MOST_CELLS = 6000  # of one size, of rims that are ragged as the triangles of a mesh are
+MOST_CELLS = 6000  # of one size on a face, of rims that are ragged as the triangles of a mesh are
+POINTS = 2**16  # whose codes are evaluated at once
+
+
+@dataclass(frozen=True, eq=False)
+class Faces:
+    """Hold the faces of one name of k patches of equal degrees and knots. hands: (k,), the orientations of the maps."""
+
+    group: PatchGroup
+    axis: int
+    side: int
+    hands: IntArray
+
+    @classmethod
+    def of(cls, group: PatchGroup, axis: int, side: int) -> "Faces":
+        """Return the faces of a group."""
+        return cls(group, axis, side, orientations(group))
+
+    def rows(self, rows: IntArray) -> "Faces":
+        """Return some of the faces."""
+        return replace(self, group=self.group.rows(rows), hands=self.hands[rows])
+
+    def __len__(self) -> int:
+        return len(self.group)
+
+    @cached_property
+    def nets(self) -> Array:
+        """Return the control points (k, n, 3)."""
+        layer = np.take(self.group.control_points, -self.side, axis=1 + self.axis)
+        return layer.reshape(len(self), -1, 3)
+
+    @cached_property
+    def _surface(self) -> SplineStack:
+        """Return the maps of the faces alone, constant across them."""
+        group, keep = self.group, [-self.side]
+        degrees = [0 if a == self.axis else p for a, p in enumerate(group.degrees)]
+        knots = [np.array([0.0, 1.0]) if a == self.axis else row for a, row in enumerate(group.knots)]
+        layer = np.take(group.coefficients, keep, axis=1 + self.axis)
+        return SplineStack(tuple(degrees), tuple(knots), layer, group.weights is not None)  # type: ignore[arg-type]
+
+    def parameters(self, across: Array) -> Array:
+        """Return the parameters (m, 3) of points with parameters (m, 2) of the two directions along the faces."""
+        return np.insert(across, self.axis, float(self.side), axis=1)
+
+    def points(self, owners: IntArray, across: Array) -> Array:
+        """Return the points (3, m) of the faces `owners` (m,)."""
+        return np.ascontiguousarray(self._surface.at(owners, self.parameters(across)).T)
+
+    def areas(self, owners: IntArray, across: Array) -> Array:
+        """Return the outward normals (3, m), as long as the surface element."""
+        slopes = self._surface.slopes_at(owners, self.parameters(across))
+        area = np.cross(slopes[..., (self.axis + 1) % 3], slopes[..., (self.axis + 2) % 3])
+        signs = self.hands[owners] if self.side else -self.hands[owners]
+        return np.ascontiguousarray((signs[:, None] * area).T)
+
+    def jacobian(self, owners: IntArray, parameters: Array) -> Array:
+        """Return the derivatives (m, 3, 3) of the maps."""
+        return self.group.jacobian(owners, parameters)
 
 
 @dataclass(frozen=True, eq=False)
 class FacePoints:
-    """Hold points of a face at parameters (m, 3), their images, and the map's derivatives there.
+    """Hold points of faces at parameters (m, 3), their images, and the maps' derivatives there.
 
-    x, area: (3, m), the points in space, and the outward normals with the length of the surface element. jacobian: (m,
-    3, 3).
+    owners: (m,), the numbers of the faces. x, area: (3, m), the points in space, and the outward normals with the
+    length of the surface element. jacobian: (m, 3, 3).
     """
 
+    owners: IntArray
     parameters: Array
     x: Array
     area: Array
     jacobian: Array
 
     @classmethod
-    def of(cls, volume: BSplineVolume, hand: int, axis: int, side: int, across: Array) -> "FacePoints":
-        """Return the points with parameters (m, 2) of the two directions along a face; hand: the orientation."""
-        parameters = np.insert(across, axis, float(side), axis=1)
-        jacobian = volume.jacobian(parameters)
-        area = np.cross(jacobian[..., (axis + 1) % 3], jacobian[..., (axis + 2) % 3]).T
-        return cls(parameters, volume(parameters).T, (hand if side else -hand) * area, jacobian)
+    def of(cls, faces: Faces, owners: IntArray, across: Array) -> "FacePoints":
+        """Return the points with parameters (m, 2) of the two directions along the faces `owners` (m,)."""
+        parameters = faces.parameters(across)
+        x, area = faces.points(owners, across), faces.areas(owners, across)
+        return cls(owners, parameters, x, area, faces.jacobian(owners, parameters))
 
     @property
     def size(self) -> Array:
@@ -61,17 +119,23 @@ class FacePoints:
     @property
     def normal(self) -> Array:
         """Return the outward unit normals (3, m), zero where the face shrinks to a point."""
-        size = self.size
-        return np.asarray(self.area / np.where(size > 0.0, size, 1.0))
+        return _unit(self.area)
 
 
 @dataclass(frozen=True, eq=False)
 class SurfaceRule:
-    """Hold points on a face, their weights (m,) in space and their codes (m,)."""
+    """Hold points on faces, their weights (m,) in space and their codes (m,)."""
 
     at: FacePoints
     weights: Array
     codes: IntArray
+
+    def part(self, chosen: IntArray) -> "SurfaceRule":
+        """Return the chosen points."""
+        at = self.at
+        rows = at.owners[chosen], at.parameters[chosen]
+        points = FacePoints(*rows, at.x[:, chosen], at.area[:, chosen], at.jacobian[chosen])
+        return SurfaceRule(points, self.weights[chosen], self.codes[chosen])
 
 
 def surface_rule(
@@ -83,137 +147,188 @@ def surface_rule(
     length: float | None = None,
     needs_normal: bool = True,
 ) -> SurfaceRule | None:
-    """Return the rule of a face, without the points whose code is zero; None where all codes are zero.
+    """Return the rule of `surface_rules` for the face of one volume."""
+    return surface_rules(Faces.of(group_of(volume), axis, side), space, codes, length, needs_normal)
 
-    needs_normal: whether codes depend on normals; others get zeros for them, in a third of the time.
 
-    length: the cube root of the body's volume; faces that are smaller, as those of many blocks, are looked at no more
-    closely than those of one cube.
+def surface_rules(
+    faces: Faces, space: TrialSpace, codes: Codes, length: float | None = None, needs_normal: bool = True
+) -> SurfaceRule | None:
+    """Return the rule of all faces, without the points whose code is zero; None where all codes are zero.
 
-    Cells in which lines differ are halved until their usual error is within TOLERANCE of the regions' area. For a slab,
-    the points are those of the whole face's rule that lie on its spans, so that they do not depend on the processes.
+    space: that of all patches. needs_normal: whether codes depend on normals; others get zeros for them, in half of the
+    time. length: the cube root of the body's volume; faces that are smaller, as those of many blocks, are looked at no
+    more closely than those of one cube.
+
+    Cells in which lines differ are halved until their usual error is within TOLERANCE of the area of the regions on
+    their face. For a slab, the points are those of the whole face's rule that lie on its spans, so that they do not
+    depend on the processes.
     """
-    size = float(np.linalg.norm(np.ptp(volume.face(axis, side).reshape(-1, 3), axis=0)))
-    share = 1.0 if length is None else min(1.0, size / (np.sqrt(2.0) * length))
-    fewest = int(np.ceil(share * FEWEST))
-    whole = _Cutter(volume, space.whole, axis, side, codes, fewest, needs_normal).rule()
+    sizes = np.linalg.norm(np.ptp(faces.nets, axis=1), axis=1)
+    shares = np.ones(len(faces)) if length is None else np.minimum(1.0, sizes / (np.sqrt(2.0) * length))
+    fewest = np.ceil(shares * FEWEST).astype(np.int64)
+    whole = _Cutter(faces, space.whole, codes, fewest, needs_normal).rule()
     if whole is None or space.whole is space:
         return whole
     u, (first, *_, last) = whole.at.parameters[:, 0], space.breaks[0]
-    return _part(whole, np.flatnonzero((u >= first) & (u <= last)))
+    chosen = np.flatnonzero((u >= first) & (u <= last))
+    return whole.part(chosen) if len(chosen) else None
+
+
+@dataclass(frozen=True, eq=False)
+class _Cells:
+    """Hold cells of faces: the lower and upper ends (n, 2, 2) of both parameters, and the faces (n,)."""
+
+    ends: Array
+    owners: IntArray
+
+    def __len__(self) -> int:
+        return len(self.ends)
+
+    def __getitem__(self, chosen: Mask | IntArray) -> "_Cells":
+        return _Cells(self.ends[chosen], self.owners[chosen])
+
+    @property
+    def sizes(self) -> Array:
+        """Return the areas (n,) in the parameters."""
+        return np.asarray(np.prod(self.ends[:, 1] - self.ends[:, 0], axis=-1))
+
+    @property
+    def quarters(self) -> "_Cells":
+        """Return the four quarters of every cell."""
+        ends = np.stack([self.ends[:, 0], self.ends.mean(axis=1), self.ends[:, 1]], axis=1)  # (n, 3, 2)
+        parts = [
+            np.stack([np.stack([ends[:, i + di, 0], ends[:, j + dj, 1]], -1) for di, dj in ((0, 0), (1, 1))], axis=1)
+            for i in (0, 1)
+            for j in (0, 1)
+        ]
+        return _Cells(np.concatenate(parts), np.tile(self.owners, 4))
 
 
 @dataclass(frozen=True, eq=False)
 class _Cutter:
-    volume: BSplineVolume
+    faces: Faces
     space: TrialSpace
-    axis: int
-    side: int
     codes: Codes
-    fewest: int
+    fewest: IntArray
     needs_normal: bool
 
-    @cached_property
-    def hand(self) -> int:
-        """Return the orientation of the map."""
-        return orientation(self.volume)
-
     def rule(self) -> SurfaceRule | None:
-        """Return the quadrature rule of the face."""
-        cells, parts, covered = self._spans(), [], 0.0
-        samples = max(SAMPLES, -(-self.fewest // int(len(cells) ** 0.5)))
+        """Return the quadrature rule of the faces."""
+        cells, parts, covered = self._spans(), [], np.zeros(len(self.faces))
+        a_direction = int((len(cells) // len(self.faces)) ** 0.5)
+        samples = np.maximum(SAMPLES, -(-self.fewest // a_direction))
         for halvings in range(HALVINGS + 1):
-            seen = self._seen(cells, samples)
-            constant = (seen == seen[:, :1, :1]).all(axis=(1, 2))
-            parts.append(self._gauss(cells[constant], seen[constant, 0, 0]))
-            covered += float(_sizes(cells[constant & (seen[:, 0, 0] != 0)]).sum())
-            cells, is_bent = self._across_rims(cells[~constant])
-            is_bent |= samples > SAMPLES  # lines would lose a small part that is seen
-            sizes = _sizes(cells)
-            error = SPREAD * float(np.linalg.norm(sizes[is_bent]))
-            covered += 0.5 * float(sizes[~is_bent].sum())
-            is_last = halvings == HALVINGS or samples == SAMPLES and 4 * np.count_nonzero(is_bent) > MOST_CELLS
-            if is_last or error <= TOLERANCE * (covered + 0.5 * float(sizes[is_bent].sum())):
-                parts.append(self._on_lines(cells))
+            codes, constant = self._surveyed(cells, samples)
+            parts.append(self._gauss(cells[constant], codes[constant]))
+            covered += self._of_faces(cells, cells.sizes * (constant & (codes != 0)))
+            cells = cells[~constant]
+            bent = self._across_rims(cells) | (samples > SAMPLES)[cells.owners]  # lines would lose a small part
+            sizes, is_least = cells.sizes, samples == SAMPLES
+            error = SPREAD * np.sqrt(self._of_faces(cells, sizes**2 * bent))
+            covered += 0.5 * self._of_faces(cells, sizes * ~bent)
+            is_ended = is_least & (4 * self._of_faces(cells, 1.0 * bent) > MOST_CELLS) | (halvings == HALVINGS)
+            is_ended |= error <= TOLERANCE * (covered + 0.5 * self._of_faces(cells, sizes * bent))
+            on_lines = ~bent | is_ended[cells.owners]
+            parts.append(self._on_lines(cells[on_lines]))
+            cells, samples = cells[~on_lines].quarters, np.maximum(SAMPLES, samples // 2 + 1)  # as close as before
+            if not len(cells):
                 break
-            parts.append(self._on_lines(cells[~is_bent]))
-            cells, samples = _quartered(cells[is_bent]), max(SAMPLES, samples // 2 + 1)  # as close together as before
         found = [part for part in parts if part is not None]
         return _joined(found) if found else None
 
-    def _across_rims(self, cells: Array) -> tuple[Array, Mask]:
-        """Return the cells at rims, and the mask of the cells in which lines differ.
+    def _of_faces(self, cells: _Cells, values: Floats) -> Array:
+        """Return the sum (k,) over the cells of each face of values (n,)."""
+        return np.bincount(cells.owners, values, len(self.faces)).astype(np.float64, copy=False)
 
-        Cells with lines in the first direction come first. Lines differ where a rim ends, bends or leaves the cell
-        between two lines; otherwise the rule is exact to high order.
+    def _surveyed(self, cells: _Cells, samples: IntArray) -> tuple[IntArray, Mask]:
+        """Return for cells the code (n,) of their first corner, and whether it holds all over the cell."""
+        codes, constant = np.zeros(len(cells), dtype=np.int64), np.zeros(len(cells), dtype=bool)
+        counts = samples[cells.owners]
+        for count in np.unique(counts).tolist():
+            own = np.flatnonzero(counts == count)
+            seen = self._seen(cells[own], count)
+            codes[own], constant[own] = seen[:, 0, 0], (seen == seen[:, :1, :1]).all(axis=(1, 2))
+        return codes, constant
+
+    def _across_rims(self, cells: _Cells) -> Mask:
+        """Return the mask (n,) of the cells, all of them at rims, in which lines differ.
+
+        Lines differ where a rim ends, bends or leaves the cell between two lines; otherwise the rule is exact to high
+        order.
         """
-        if not len(cells):
-            return cells, np.zeros(0, dtype=bool)
         bent = np.zeros(len(cells), dtype=bool)
         for along, chosen in enumerate(self._directions(cells)):
             if len(chosen):
                 t = _with_ends(_unit_rule(max(self.space.degrees) + 1)[0])
                 grid = np.stack(np.meshgrid(np.linspace(0.0, 1.0, PIECES + 1), t, indexing="ij"), axis=-1)
-                points = _placed(cells[chosen][:, None, None], grid if along == 0 else grid[..., ::-1])
-                seen = self._code(points.reshape(-1, 2)).reshape(points.shape[:3])
+                seen = self._on_grid(cells[chosen], grid if along == 0 else grid[..., ::-1])
                 jumps = np.count_nonzero(np.diff(seen, axis=1), axis=1)
                 marks = np.stack([seen[:, 0], seen[:, -1], jumps], axis=-1)
                 bent[chosen] = (marks != marks[:, :1]).any(axis=(1, 2))
-        return cells, bent
+        return bent
 
-    def _directions(self, cells: Array) -> tuple[IntArray, IntArray]:
+    def _directions(self, cells: _Cells) -> tuple[IntArray, IntArray]:
         """Return the numbers of the cells whose codes jump more often along the first direction, and of the rest."""
         seen = self._seen(cells, SAMPLES)
         jumps = [np.count_nonzero(np.diff(seen, axis=1 + along), axis=(1, 2)) for along in (0, 1)]
         return np.flatnonzero(jumps[0] >= jumps[1]), np.flatnonzero(jumps[0] < jumps[1])
 
-    def _spans(self) -> Array:
-        """Return the spans of the face as cells (k, 2, 2): lower and upper ends of both directions."""
-        b, c = (self.space.breaks[a] for a in range(3) if a != self.axis)
+    def _spans(self) -> _Cells:
+        """Return the spans of all faces."""
+        b, c = (self.space.breaks[a] for a in range(3) if a != self.faces.axis)
         low = np.stack(np.meshgrid(b[:-1], c[:-1], indexing="ij"), axis=-1).reshape(-1, 2)
         high = np.stack(np.meshgrid(b[1:], c[1:], indexing="ij"), axis=-1).reshape(-1, 2)
-        return np.stack([low, high], axis=1)
+        ends, count = np.stack([low, high], axis=1), len(self.faces)
+        return _Cells(np.tile(ends, (count, 1, 1)), np.repeat(np.arange(count), len(ends)))
 
-    def _code(self, across: Array) -> IntArray:
+    def _code(self, owners: IntArray, across: Array) -> IntArray:
         """Return the codes (m,) of points with parameters (m, 2)."""
-        if self.needs_normal:
-            at = FacePoints.of(self.volume, self.hand, self.axis, self.side, across)
-            return self.codes(at.x, at.normal)
-        x = self.volume(np.insert(across, self.axis, float(self.side), axis=1)).T
-        return self.codes(x, np.zeros_like(x))
+        found = np.empty(len(across), dtype=np.int64)
+        for start in range(0, len(across), POINTS):
+            here = slice(start, start + POINTS)
+            x = self.faces.points(owners[here], across[here])
+            normal = _unit(self.faces.areas(owners[here], across[here])) if self.needs_normal else np.zeros_like(x)
+            found[here] = self.codes(x, normal, owners[here])
+        return found
 
-    def _seen(self, cells: Array, samples: int) -> IntArray:
-        """Return the codes (k, samples + 2, samples + 2) of cells on grids that contain their ends.
+    def _on_grid(self, cells: _Cells, grid: Array) -> IntArray:
+        """Return the codes (n, a, b) of points at places (a, b, 2) of the unit square in each cell."""
+        points = np.clip(_placed(cells.ends[:, None, None], grid), 0.0, 1.0)
+        owners = np.repeat(cells.owners, grid.shape[0] * grid.shape[1])
+        return self._code(owners, points.reshape(-1, 2)).reshape(points.shape[:3])
+
+    def _seen(self, cells: _Cells, samples: int) -> IntArray:
+        """Return the codes (n, samples + 2, samples + 2) of cells on grids that contain their ends.
 
         A grid extends one point beyond its cell, so that it finds a rim that bulges into the cell between two points.
         """
         step = 1.0 / (samples - 1)
         t = np.linspace(-step, 1.0 + step, samples + 2)
-        grid = np.stack(np.meshgrid(t, t, indexing="ij"), axis=-1)
-        points = np.clip(_placed(cells[:, None, None], grid), 0.0, 1.0)
-        return self._code(points.reshape(-1, 2)).reshape(points.shape[:3])
+        return self._on_grid(cells, np.stack(np.meshgrid(t, t, indexing="ij"), axis=-1))
 
-    def _gauss(self, cells: Array, codes: IntArray) -> SurfaceRule | None:
+    def _gauss(self, cells: _Cells, codes: IntArray) -> SurfaceRule | None:
         """Return Gauss points on cells of one code each."""
         kept = codes != 0
+        cells, codes = cells[kept], codes[kept]
         t, weights = _unit_rule(max(self.space.degrees) + 1)
         grid = np.stack(np.meshgrid(t, t, indexing="ij"), axis=-1).reshape(-1, 2)
-        points = _placed(cells[kept, None], grid)
-        size = np.prod(cells[kept, 1] - cells[kept, 0], axis=-1)
+        points = _placed(cells.ends[:, None], grid)
         return self._weighted(
+            np.repeat(cells.owners, len(grid)),
             points.reshape(-1, 2),
-            np.multiply.outer(size, np.multiply.outer(weights, weights).ravel()).ravel(),
-            np.repeat(codes[kept], len(grid)),
+            np.multiply.outer(cells.sizes, np.multiply.outer(weights, weights).ravel()).ravel(),
+            np.repeat(codes, len(grid)),
         )
 
-    def _weighted(self, across: Array, weights: Array, codes: IntArray) -> SurfaceRule | None:
+    def _weighted(self, owners: IntArray, across: Array, weights: Array, codes: IntArray) -> SurfaceRule | None:
         """Return a rule from weights in the parameters; None where all codes are zero."""
         if not len(across):
             return None
-        at = FacePoints.of(self.volume, self.hand, self.axis, self.side, across)
+        at = FacePoints.of(self.faces, owners, across)
         return SurfaceRule(at, weights * at.size, codes)
 
-    def _on_lines(self, cells: Array) -> SurfaceRule | None:
+    def _on_lines(self, cells: _Cells) -> SurfaceRule | None:
         """Return points on cells at a rim: they lie on lines in the direction in which the code jumps more often."""
         if not len(cells):
             return None
@@ -221,19 +336,20 @@ class _Cutter:
         found = [part for part in parts if part is not None]
         return _joined(found) if found else None
 
-    def _lines_along(self, cells: Array, along: int) -> SurfaceRule | None:
+    def _lines_along(self, cells: _Cells, along: int) -> SurfaceRule | None:
         """Return points on lines of one direction through cells."""
         if not len(cells):
             return None
         t, weights = _unit_rule(max(self.space.degrees) + 1)
-        low, size = np.repeat(cells[:, 0], len(t), axis=0), np.repeat(cells[:, 1] - cells[:, 0], len(t), axis=0)
+        low, size = (np.repeat(row, len(t), axis=0) for row in (cells.ends[:, 0], np.diff(cells.ends, axis=1)[:, 0]))
+        owners = np.repeat(cells.owners, len(t))
         fixed, line_weights = np.tile(t, len(cells)), np.tile(weights, len(cells))
 
         def codes(line: IntArray, s: Array) -> tuple[Array, IntArray]:
             places = np.empty((len(s), 2))
             places[:, along], places[:, 1 - along] = s, fixed[line]
             across = low[line] + places * size[line]
-            return across, self._code(across)
+            return across, self._code(owners[line], across)
 
         lines = np.arange(len(low))
         s = np.linspace(0.0, 1.0, PIECES + 1)
@@ -253,7 +369,7 @@ class _Cutter:
         each = np.multiply.outer(length * line_weights[of_line] * np.prod(size[of_line], axis=1), weights).ravel()
         middles = np.repeat(found.reshape(-1, len(t))[:, len(t) // 2], len(t))  # one code a piece
         kept = (middles != 0) & (each > 0.0)
-        return self._weighted(across[kept], each[kept], middles[kept])
+        return self._weighted(np.repeat(owners[of_line], len(t))[kept], across[kept], each[kept], middles[kept])
 
 
 def _placed(cells: Array, places: Array) -> Array:
@@ -267,39 +383,20 @@ def _unit_rule(count: int) -> tuple[Array, Array]:
     return 0.5 * (points + 1.0), 0.5 * weights
 
 
-def _quartered(cells: Array) -> Array:
-    """Return the four quarters of every cell."""
-    middle = cells.mean(axis=1)
-    ends = np.stack([cells[:, 0], middle, cells[:, 1]], axis=1)  # (k, 3, 2)
-    parts = [
-        np.stack([np.stack([ends[:, i + di, 0], ends[:, j + dj, 1]], axis=-1) for di, dj in ((0, 0), (1, 1))], axis=1)
-        for i in (0, 1)
-        for j in (0, 1)
-    ]
-    return np.concatenate(parts)
-
-
-def _sizes(cells: Array) -> Array:
-    """Return the areas (k,) of cells in the parameters."""
-    return np.asarray(np.prod(cells[:, 1] - cells[:, 0], axis=-1))
+def _unit(rows: Array) -> Array:
+    """Return vectors (3, m) of length 1 in place of those of any length; zero stays zero."""
+    size = np.linalg.norm(rows, axis=0)
+    return np.asarray(rows / np.where(size > 0.0, size, 1.0))
 
 
 def _with_ends(t: Array) -> Array:
     return np.concatenate([[0.0], t, [1.0]])
 
 
-def _part(rule: SurfaceRule, chosen: IntArray) -> SurfaceRule | None:
-    """Return the chosen points of a rule; None where there are none."""
-    if not len(chosen):
-        return None
-    at = rule.at
-    points = FacePoints(at.parameters[chosen], at.x[:, chosen], at.area[:, chosen], at.jacobian[chosen])
-    return SurfaceRule(points, rule.weights[chosen], rule.codes[chosen])
-
-
 def _joined(parts: Sequence[SurfaceRule]) -> SurfaceRule:
     """Return the points of several rules as one."""
     at = FacePoints(
+        np.concatenate([part.at.owners for part in parts]),
         np.concatenate([part.at.parameters for part in parts]),
         np.concatenate([part.at.x for part in parts], axis=1),
         np.concatenate([part.at.area for part in parts], axis=1),

@@ -10,41 +10,50 @@ docs/solver.md says how gamma keeps it coercive.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 from scipy.sparse import block_array, coo_array, csr_array, diags_array, eye_array, kron
 
-from parameterize.arrays import Array, IntArray
+from parameterize.arrays import Array, IntArray, Mask
 from parameterize.spline.volume import FACE_NAMES
 
-from ..field import Points
+from ..field import Points, part_of
 from ..forms.form import Form
-from .face_data import on_layer
+from .face_data import by_patches, on_layer
 
 # Share of a component that is held: a plane face across another axis holds so little by rounding alone, and a patch
 # among others that it seemed to hold would be inverted with an eigenvalue of either sign.
 ROUNDING = 1e-12
 
 
+OF_FACES = ("name", "patches", "form", "is_whole", "tables", "slope", "layers")  # what has no entry for each point
+
+
 @dataclass(frozen=True, eq=False)
 class WeakFace:
-    """Hold the terms of all regions' conditions on one face of the cube, for c components, at m points.
+    """Hold the terms of all regions' conditions on faces of one name of k patches, for c components, at m points.
 
-    x, normal: (3, m), points in space and outward unit normals. weights: (m,), the weights of integrals in space.
-    inverse: (3, 3, m), J^-1. codes: (m,), bit i + 1 where condition i holds. projector: (c, c, m), P. values: (c, m), P
-    g. gamma: (m,). slowest: (m,), the law's factor over the depth of the cube behind the face, that is gamma without
+    The patches have equal degrees, knots, laws and data. Coefficients are those of the k patches.
+
+    patches: (k,), their numbers. owners: (m,), the place among them of the patch of each point. x, normal: (3, m),
+    points in space and outward unit normals. weights: (m,), the weights of integrals in space. inverse: (3, 3, m),
+    J^-1. codes: (m,), bit i + 1 where condition i holds. projector: (c, c, m), P. values: (c, m), P g. gamma: (m,),
+    zero where P is. slowest: (m,), the law's factor over the depth of the cube behind the face, that is gamma without
     its constants on a single span. factor: (m,), the factor of an exchange. loads: (c, m), the given flux into the
-    body, outside of P. is_whole: whether some P is given at all points of the face.
+    body, outside of P. is_whole: (k,), whether some P is given at all points of the face.
 
-    tables: (m, n_b n_c) each, values of the face's functions and their derivatives in its two directions. slope: the
+    tables: (m, k n_b n_c) each, values of the faces' functions and their derivatives in the two directions. slope: the
     derivative across the face of the functions of its layer, minus that of the next layer. layers: the coefficients of
-    the face's functions and of the next layer in an array (n_u, n_v, n_w).
+    a face's functions and of the next layer in an array (n_u, n_v, n_w).
     """
 
     name: str
+    patches: IntArray
+    owners: IntArray
     form: Form
     x: Points
     normal: Array
@@ -57,10 +66,23 @@ class WeakFace:
     slowest: Array
     factor: Array
     loads: Array
-    is_whole: bool
+    is_whole: Mask
     tables: tuple[csr_array, csr_array, csr_array]
     slope: float
     layers: tuple[tuple[int | slice, ...], tuple[int | slice, ...]]
+
+    def on(self, patches: IntArray) -> WeakFace:
+        """Return the terms on the faces of some of the patches, by their numbers."""
+        chosen = np.flatnonzero(np.isin(self.patches, patches))
+        points = np.flatnonzero(np.isin(self.owners, chosen))
+        width = self.tables[0].shape[1] // len(self.patches)
+        columns = (chosen[:, None] * width + np.arange(width)).ravel()
+        value, along_b, along_c = (table[points][:, columns] for table in self.tables)
+        parts: dict[str, Any] = {"tables": (value, along_b, along_c), "x": part_of(self.x, points)}
+        parts |= {"owners": np.searchsorted(chosen, self.owners[points])}
+        for name in (field.name for field in fields(self) if field.name not in (*OF_FACES, *parts)):
+            parts[name] = getattr(self, name)[..., points]
+        return replace(self, patches=self.patches[chosen], is_whole=self.is_whole[chosen], **parts)
 
     @cached_property
     def held(self) -> Array:
@@ -88,8 +110,14 @@ class WeakFace:
         """Return the mask (m,) of the points where the condition with this number holds."""
         return self.codes >> (condition + 1) & 1 == 1
 
+    def of_patches(self, values: Array) -> Array:
+        """Return the sums (..., k) over the points of each patch of values (..., m)."""
+        rows = values.reshape(-1, len(self.owners))
+        found = [np.bincount(self.owners, row, len(self.patches)) for row in rows]
+        return np.reshape(found, (*values.shape[:-1], len(self.patches)))
+
     def traces(self, coefficients: Array) -> tuple[Array, Array]:
-        """Return u (c, m) and t = flux . n (c, m) of coefficients (c, n_u, n_v, n_w)."""
+        """Return u (c, m) and t = flux . n (c, m) of coefficients (k, c, n_u, n_v, n_w)."""
         here, behind = (self._layer(coefficients, layer) for layer in self.layers)
         value, along_b, along_c = self.tables
         u, slopes = value @ here, [self.slope * (value @ (here - behind)), along_b @ here, along_c @ here]
@@ -97,27 +125,42 @@ class WeakFace:
         return u.T, (self._flux(u.T, grad) * self.normal).sum(axis=1)
 
     def add_product(self, coefficients: Array, result: Array) -> None:
-        """Add the product of the terms and coefficients (c, n_u, n_v, n_w) to a result of the same shape."""
+        """Add the product of the terms and coefficients (k, c, n_u, n_v, n_w) to a result of the same shape."""
         u, flux = self.traces(coefficients)
         tested = np.einsum("cdm,dm->cm", self.stiff, u) - np.einsum("cdm,dm->cm", self.held, flux)
         self._spread(tested, -np.einsum("cdm,dm->cm", self.held, u), result)
 
     def matrix(self, shape: tuple[int, ...]) -> coo_array:
-        """Return the matrix of the terms for coefficients of a shape (c, n_u, n_v, n_w) as a vector."""
-        one = eye_array(shape[0])
-        here, behind = (on_layer(self.tables[0], layer, shape) for layer in self.layers)
-        values = kron(one, here, format="csr")
-        found = values.T @ _at_points(self.stiff) @ values
-        if self.held.any():
-            along = (on_layer(table, self.layers[0], shape) for table in self.tables[1:])
-            slopes = [kron(one, table, format="csr") for table in (self.slope * (here - behind), *along)]
-            tests, (by_value, *by_slopes) = self._tests, self._traces
-            test = sum(_at_points(own) @ slope for own, slope in zip(tests, slopes, strict=True))
-            trace = sum(_at_points(own) @ slope for own, slope in zip(by_slopes, slopes, strict=True))
-            trace = trace + _at_points(by_value) @ values
-            held = _at_points(self.held)
-            found = found - values.T @ held @ trace - test.T @ held @ values
-        return found.tocoo()
+        """Return the matrix of the terms for coefficients of a shape (c, n_u, n_v, n_w) of each patch, as one vector.
+
+        The k patches come one after another.
+        """
+        c, functions = shape[0], math.prod(shape[1:])
+        found = coo_array((c * len(self.patches) * functions,) * 2)
+        acting, held = (np.flatnonzero(own.any(axis=(0, 1))) for own in (self.stiff, self.held))
+        if len(acting):
+            values = self._of_components(self.tables[0][acting], self.layers[0], shape)
+            found = found + values.T @ _at_points(self.stiff[..., acting]) @ values
+        if len(held):
+            found = found - self._fluxes(held, shape)
+        return by_patches(found.tocoo(), shape)
+
+    def _fluxes(self, points: IntArray, shape: tuple[int, ...]) -> csr_array:
+        """Return the matrix of the terms with fluxes at some points, of components one after another."""
+        tables = [table[points] for table in self.tables]
+        here, behind = (self._of_components(tables[0], layer, shape) for layer in self.layers)
+        along = (self._of_components(table, self.layers[0], shape) for table in tables[1:])
+        slopes = [self.slope * (here - behind), *along]
+        tests, (by_value, *by_slopes) = self._tests, self._traces
+        test = sum(_at_points(own[..., points]) @ slope for own, slope in zip(tests, slopes, strict=True))
+        trace = sum(_at_points(own[..., points]) @ slope for own, slope in zip(by_slopes, slopes, strict=True))
+        trace = trace + _at_points(by_value[..., points]) @ here
+        held = _at_points(self.held[..., points])
+        return csr_array(here.T @ held @ trace + test.T @ held @ here)
+
+    def _of_components(self, table: csr_array, layer: tuple[int | slice, ...], shape: tuple[int, ...]) -> csr_array:
+        """Return a table (m, k n_b n_c) of the functions of a layer as that (c m, c k n_u n_v n_w) of all functions."""
+        return kron(eye_array(shape[0]), on_layer(table, layer, shape), format="csr")
 
     @property
     def _order(self) -> list[int]:
@@ -141,12 +184,12 @@ class WeakFace:
         return [pulled[:, :, axis] for axis in self._order]
 
     def add_load(self, load: Array) -> None:
-        """Add the terms of the right-hand side to a load (c, n_u, n_v, n_w)."""
+        """Add the terms of the right-hand side to a load (k, c, n_u, n_v, n_w)."""
         loads = self.weights * (self.loads + self.gamma * self.values)
         self._spread(loads, -self.weights * self.values, load)
 
     def add_diagonal(self, component: int, diagonal: Array) -> None:
-        """Add the diagonal of a component's block to an array (n_u, n_v, n_w)."""
+        """Add the diagonal of a component's block to an array (k, n_u, n_v, n_w)."""
         value, along_b, along_c = self.tables
         unit = np.zeros((self.form.components, len(self.weights)))
         unit[component] = 1.0
@@ -155,17 +198,17 @@ class WeakFace:
         squares = value.power(2)
         found = squares.T @ (self.stiff[component, component] - 2.0 * self.slope * across)
         found -= 2.0 * (value.multiply(along_b).T @ b + value.multiply(along_c).T @ c)
-        layer = diagonal[self.layers[0]]
+        layer = diagonal[:, *self.layers[0]]
         layer += found.reshape(layer.shape)
 
     def add_lumped(self, component: int, diagonal: Array, share: float = 1.0) -> None:
-        """Add the integral of a share of gamma and of the factors times each function to an array (n_u, n_v, n_w)."""
-        layer = diagonal[self.layers[0]]
+        """Add the integral of a share of gamma, and of factors, times each function to an array (k, n_u, n_v, n_w)."""
+        layer = diagonal[:, *self.layers[0]]
         stiff = self.stiff[component, component] - (1.0 - share) * self.gamma * self.held[component, component]
         layer += (self.tables[0].T @ stiff).reshape(layer.shape)
 
-    def stiffness(self, component: int) -> float:
-        """Return the factor of u v of one component that represents the face in the preconditioner, integrated over it.
+    def stiffness(self, component: int) -> Array:
+        """Return the factor (k,) of u v of one component that represents each face in the preconditioner, integrated.
 
         It is the integral of gamma and of the factors. Where values are given on a part of the face only, waves along
         the face have a factor between gamma and zero: the geometric mean of gamma and 1 / depth, of the whole cube
@@ -173,12 +216,13 @@ class WeakFace:
         """
         held = self.held[component, component]
         held = np.where(held > ROUNDING * self.weights, held, 0.0)
-        fast, slow = float(held @ self.gamma), float(held @ self.slowest)
-        loose = float((self.weights - held) @ self.factor)
-        return loose + (fast if self.is_whole else float(np.sqrt(fast * slow)))
+        loose, fast, slow = self.of_patches(
+            np.stack([(self.weights - held) * self.factor, held * self.gamma, held * self.slowest])
+        )
+        return np.asarray(loose + np.where(self.is_whole, fast, np.sqrt(fast * slow)))
 
     def values_of(self, coefficients: Array) -> Array:
-        """Return the values (c, m) of coefficients (c, n_u, n_v, n_w)."""
+        """Return the values (c, m) of coefficients (k, c, n_u, n_v, n_w)."""
         return np.asarray((self.tables[0] @ self._layer(coefficients, self.layers[0])).T)
 
     def force(self, coefficients: Array, points: Any) -> Array:
@@ -193,8 +237,9 @@ class WeakFace:
         return np.asarray((self.weights * density)[:, points].sum(axis=1))
 
     def _layer(self, coefficients: Array, layer: tuple[int | slice, ...]) -> Array:
-        """Return the coefficients (n_b n_c, c) of a layer."""
-        return np.ascontiguousarray(coefficients[:, *layer].reshape(len(coefficients), -1).T)
+        """Return the coefficients (k n_b n_c, c) of a layer."""
+        own = np.moveaxis(coefficients[:, :, *layer], 1, -1)  # (k, n_b, n_c, c)
+        return np.ascontiguousarray(own).reshape(-1, own.shape[-1])
 
     def _flux(self, u: Array, grad: Array) -> Array:
         return np.asarray(self.form.flux(u, grad, self.x), dtype=np.float64)
@@ -205,15 +250,15 @@ class WeakFace:
         return np.einsum("adm,cdm->cam", self.inverse, flux)
 
     def _spread(self, values: Array, vectors: Array, result: Array) -> None:
-        """Add int values . v + int vectors . t(v), both (c, m) with weights, to coefficients (c, n_u, n_v, n_w)."""
+        """Add int values . v + int vectors . t(v), both (c, m) with weights, to integrals (k, c, n_u, n_v, n_w)."""
         value, along_b, along_c = self.tables
         pulled = self._pulled(vectors)
         b, c = (pulled[:, a].T for a in range(3) if a != self.axis)
         across = self.slope * (value.T @ pulled[:, self.axis].T)
         here = value.T @ values.T + across + along_b.T @ b + along_c.T @ c
         for layer, part in zip(self.layers, (here, -across), strict=True):
-            target = result[:, *layer]
-            target += part.T.reshape(target.shape)
+            target = np.moveaxis(result[:, :, *layer], 1, -1)
+            target += part.reshape(target.shape)
 
 
 def _at_points(factors: Array) -> csr_array:

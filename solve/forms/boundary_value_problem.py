@@ -10,7 +10,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from parameterize.arrays import Array
-from parameterize.spline.body import Body, BodyLike
+from parameterize.spline.body import Body, BodyLike, as_body
 from parameterize.spline.volume import FACE_NAMES
 
 from ..field import FieldOnBody
@@ -155,7 +155,8 @@ class BoundaryValueProblem:
                 raise ValueError(
                     f"{datum.name}: the field was found on another volume; give one of the volume that is solved on"
                 )
-        return self.placed(UnitFrame.of(body)) if self.is_scaled else self
+        needs_size = bool(self.conditions) and not as_body(body).is_single  # small faces are looked at less closely
+        return self.placed(UnitFrame.of(body)) if self.is_scaled or needs_size else self
 
     @property
     def patch_faces(self) -> set[str]:
@@ -179,6 +180,11 @@ class BoundaryValueProblem:
         given = ((face, one and one.datum and one.datum.entries) for face, one in strong.items())
         exact = self.data.get("exact")
         return tuple(sorted(given, key=lambda one: one[0])), exact and exact.entries
+
+    @property
+    def on_regions(self) -> Hashable:
+        """Return what the data on regions are made of: the same for patches where they are the same."""
+        return tuple(datum.entries for one in self.conditions for datum in one.parsed.values())
 
     @property
     def loads(self) -> list[str]:

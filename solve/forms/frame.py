@@ -7,13 +7,14 @@ from typing import Any
 import numpy as np
 
 from parameterize.arrays import Array
-from parameterize.spline.body import BodyLike, as_body
+from parameterize.spline.body import Body, BodyLike, as_body
 from parameterize.spline.bspline import divided_spans
-from parameterize.spline.orientation import FACES, enclosed_volume, face_vectors, orientation
+from parameterize.spline.orientation import FACES, enclosed_volumes, face_vectors, orientation
 from parameterize.spline.volume import BSplineVolume
 
 from ..field import Points
 
+PATCHES = 2**10  # that are sampled at once
 BOX_SAMPLES = 8  # intervals a span and direction in which the boundary is sampled for its bounding box
 
 
@@ -31,15 +32,14 @@ class UnitFrame:
     def of(cls, body: BodyLike) -> "UnitFrame":
         """Return the frame of a body.
 
-        The size of the volume follows from the six faces (`enclosed_volume`); the bounding box is that of points on the
-        faces, BOX_SAMPLES a span and direction. The folded parts of a map count with the opposite sign.
+        The size of the volume follows from the six faces (`enclosed_volumes`); the bounding box is that of points on
+        outer faces, BOX_SAMPLES a span and direction. The folded parts of a map count with the opposite sign.
         Raises ValueError where the volume encloses nothing.
         """
-        patches = as_body(body).patches
-        samples = (points for volume in patches for points in _face_samples(volume))
-        ends = np.array([(points.min(axis=(1, 2)), points.max(axis=(1, 2))) for points in samples])  # (f, 2, 3)
+        glued = as_body(body)
+        ends = np.concatenate(list(_boxes(glued)))  # (f, 2, 3)
         middle = (ends[:, 0].min(axis=0) + ends[:, 1].max(axis=0)) / 2.0
-        enclosed = sum(abs(enclosed_volume(volume, middle)) for volume in patches)
+        enclosed = sum(float(np.abs(enclosed_volumes(group, middle)).sum()) for group in glued.groups)
         if enclosed == 0.0:
             raise ValueError("X, Y, Z have no scale here: the volume encloses nothing; check it with `iga-nn check`")
         x, y, z = middle.tolist()
@@ -54,11 +54,15 @@ class UnitFrame:
         return {"center": list(self.center), "length": self.length}
 
 
-def _face_samples(volume: BSplineVolume) -> Iterator[Array]:
-    """Yield points (3, k, l) of each face of a volume."""
-    rows = [divided_spans(knots, BOX_SAMPLES) for knots in volume.knots]
-    for face in FACES:
-        yield face_vectors(volume, rows, *face)[0]
+def _boxes(body: Body) -> Iterator[Array]:
+    """Yield the least and the largest coordinates (k, 2, 3) of points on outer faces, those of one name at once."""
+    outer = ~body.glued.reshape(len(body), -1)
+    for group in body.groups:
+        rows = [divided_spans(knots, BOX_SAMPLES) for knots in group.knots]
+        for face, (axis, side) in enumerate(FACES):
+            for some in group.rows(outer[group.numbers, face]).divided(PATCHES):
+                points = face_vectors(some, rows, axis, side)[0]  # (3, k, ..)
+                yield np.stack([points.min(axis=(2, 3)).T, points.max(axis=(2, 3)).T], axis=1)
 
 
 def face_geometry(volume: BSplineVolume, rows: Sequence[Array], axis: int, side: int) -> tuple[Points, Array]:

@@ -53,6 +53,36 @@ class Part(Protocol):
         """Return the triangles (k,) reached from a triangle across edges that bend by less than an angle in degrees."""
 
 
+@dataclass(frozen=True, eq=False)
+class FacesOfPoints:
+    """Say on which faces points (3, ...) lie.
+
+    names: of the faces, such as "u0", or "p2_u0" of patch 2 of several. of: (...), the number of the face of each
+    point. near: a number or (...), the tolerance of positions.
+    """
+
+    names: Sequence[str]
+    of: IntArray
+    near: float | Array
+
+    def named(self, name: str) -> Mask:
+        """Return the mask (...) of the points on faces of a name: "u0" of all patches, "p2_u0" of one."""
+        is_one = "_" in name
+        alike = [own == name if is_one else own.endswith(name) for own in self.names]
+        return np.asarray(np.array(alike)[self.of])
+
+    def nearest(self, surface: Part, x: Array, normal: Array) -> IntArray:
+        """Return the triangle (...) of a surface nearest to each point; it is found once for all regions."""
+        if id(surface) not in self._nearest:
+            found = surface.nearest(x.reshape(3, -1).T, normal.reshape(3, -1).T)
+            self._nearest[id(surface)] = found.reshape(x.shape[1:])
+        return self._nearest[id(surface)]
+
+    @cached_property
+    def _nearest(self) -> dict[int, IntArray]:
+        return {}
+
+
 @dataclass(frozen=True)
 class Region:
     """A part of the solid's boundary: where a condition on the position and the outward normal holds.
@@ -190,35 +220,36 @@ class Region:
         face: the cube's face on whose image the points lie, if any: "u0", or "p2_u0" of patch 2 of several. Raises
         ExpressionError where X, Y, Z occur without a frame, ValueError where the surface lacks a face or group.
         """
-        x, normal = np.asarray(x), np.asarray(normal)
-        near = _tolerance(x)
-        jets = _moved(x, near)
+        return self.holds_on(np.asarray(x), np.asarray(normal), FacesOfPoints((face,), np.array(0), tolerance(x)))
+
+    def holds_on(self, x: Array, normal: Array, on: FacesOfPoints) -> Mask:
+        """Return the mask of `holds` for points (3, ...) on several faces."""
+        jets = _moved(x, on.near)
         if self.is_scaled and self.frame is None:
             raise ExpressionError(f"region {self.text!r:.80}: X, Y, Z mean nothing without a volume")
-        of_frame = scaled(self.frame, jets) if self.frame is not None else jets
+        of_frame = scaled(self.frame, jets) if self.frame is not None and self.is_scaled else jets
         nearest = None
         if self.surface is not None and self.needs_normal:
-            nearest = self.surface.nearest(x.reshape(3, -1).T, normal.reshape(3, -1).T).reshape(x.shape[1:])
+            nearest = on.nearest(self.surface, x, normal)
             normal = np.moveaxis(self.surface.normals[nearest], -1, 0)
         values: list[Any] = [*jets, *of_frame, *_moved(normal, TOLERANCE)]
-        shape = x.shape[1:]
-        values += [np.full(shape, face.endswith(name)) for name in FACE_NAMES]
-        values += [self._marked(entry, x, near, nearest, face) for entry in self._marks[len(FACE_NAMES) :]]
+        values += [on.named(name) if name in self._used else False for name in FACE_NAMES]
+        values += [self._marked(entry, x, nearest, on) for entry in self._marks[len(FACE_NAMES) :]]
         with np.errstate(all="ignore"):
-            return np.broadcast_to(np.asarray(self._decide(values), dtype=bool), shape)
+            return np.broadcast_to(np.asarray(self._decide(values), dtype=bool), x.shape[1:])
 
-    def _marked(self, entry: str, x: Array, near: float, nearest: IntArray | None, face: str) -> Mask:
+    def _marked(self, entry: str, x: Array, nearest: IntArray | None, on: FacesOfPoints) -> Mask:
         """Return the mask (...) of the points that lie on a patch's face, in a box, or in a group or face of the part.
 
-        near: the tolerance of positions. nearest: (...), the nearest triangle of the part for each point.
+        nearest: (...), the nearest triangle of the part for each point.
         """
         kind, argument = entry.split(" ", 1)
         if kind == "patch":
-            return np.full(x.shape[1:], face == argument)
+            return on.named(argument)
         if kind == "box":
             low, high = np.sort(np.reshape(_numbers(argument), (2, 3)), axis=0)
             sides = (slice(None), *[None] * (x.ndim - 1))
-            inside: Mask = np.all((x >= low[sides] - near) & (x <= high[sides] + near), axis=0)
+            inside: Mask = np.all((x >= low[sides] - on.near) & (x <= high[sides] + on.near), axis=0)
             return inside
         if nearest is None:
             raise ValueError(
@@ -249,17 +280,23 @@ def regions_of(given: Regions) -> list[Region]:
     return [region for entry in given for region in regions_of(entry)]
 
 
-def _tolerance(x: Array) -> float:
+def tolerance(x: Array) -> float:
     """Return the tolerance of the positions of points (3, ...), a length; 0 where one of them is not finite."""
-    points = x.reshape(3, -1)
-    if not points.size or not np.all(np.isfinite(points)):
-        return 0.0
-    return TOLERANCE * max(float(np.linalg.norm(np.ptp(points, axis=1))), FAR * float(np.abs(points).max()))
+    points = np.reshape(x, (3, -1)).T
+    return float(tolerances(points[None])[0]) if points.size else 0.0
 
 
-def _moved(rows: Array, step: float) -> list[Jet]:
+def tolerances(points: Array) -> Array:
+    """Return the tolerances (k,) of positions near each of several sets of points (k, n, 3)."""
+    sizes = np.linalg.norm(np.ptp(points, axis=1), axis=1)
+    found = TOLERANCE * np.maximum(sizes, FAR * np.abs(points).max(axis=(1, 2)))
+    return np.where(np.isfinite(found), found, 0.0)
+
+
+def _moved(rows: Array, step: float | Array) -> list[Jet]:
     """Return the jets of three coordinates (3, ...) whose gradient is the change along a step in each direction."""
-    return [replace(jet, gradient=tuple(step * slope for slope in jet.gradient)) for jet in coordinates(rows)]
+    steps = [tuple(step if slope else 0.0 for slope in jet.gradient) for jet in coordinates(rows)]
+    return [replace(jet, gradient=row) for jet, row in zip(coordinates(rows), steps, strict=True)]
 
 
 def _change(a: Jet, b: Jet) -> Any:

@@ -35,7 +35,7 @@ class DeviceMatrix:
     def __init__(self, matrix: BodyMatrix, device: str) -> None:
         alone = [_alone(matrix, patch) for patch in matrix.alone]
         self._pieces = [(one.group, piece) for one in (*matrix.stacks, *alone) for piece in _pieces(one, device)]
-        faces = matrix.faces_of(range(len(matrix.parts)))
+        faces = matrix.matrix_of(matrix.faces)
         self._faces = sparse(faces, device) if faces.nnz else None
 
     def apply(self, source: OnPatches) -> OnPatches:

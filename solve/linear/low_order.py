@@ -121,10 +121,11 @@ def entries_of(
     """
     rows, columns, entries = _entries(nodes, apply, components)
     on_faces = nodes.layout.empty(components)
-    for part, own in zip(matrix.parts, on_faces, strict=True):
-        for face in part.faces.values():
-            for component, total in enumerate(own):
-                face.add_lumped(component, total, HELD)
+    for face in matrix.faces:
+        found = np.zeros_like(on_faces.of(face.patches))
+        for component in range(components):
+            face.add_lumped(component, found[:, component], HELD)
+        on_faces.add(face.patches, found)
     lumped = nodes.collect(on_faces)
     here = rows == columns
     for component in range(components):
@@ -198,14 +199,20 @@ def surveyed(matrix: BodyMatrix) -> Survey:
     """Return the survey of the matrix of a body; of several components one block after another is assembled."""
     first, components = matrix.laws[0], matrix.laws[0].form.components
     blocks = ((matrix.block(i) if first.component is None else matrix).parts for i in range(components))
-    return survey_of(matrix.layout, components, blocks)
+    return survey_of(matrix, blocks)
 
 
-def survey_of(layout: CoefficientLayout, components: int, blocks: Iterable[Sequence[Operator]]) -> Survey:
-    """Return the survey of operators: of each component those of all patches."""
+def survey_of(matrix: BodyMatrix, blocks: Iterable[Sequence[Operator]]) -> Survey:
+    """Return the survey of operators, of each component those of all patches; the terms on faces are the matrix's."""
+    layout, components = matrix.layout, matrix.laws[0].form.components
     diagonal, free = layout.empty(components), np.ones(len(layout.shapes), dtype=bool)
     for component, parts in enumerate(blocks):
         for own, entries in zip(diagonal, diagonals(parts), strict=True):
             own[component] = entries
         free &= list(map(leaves_constants, parts))
+        for face in matrix.shared_faces:
+            found = np.zeros_like(diagonal.of(face.patches))
+            face.add_diagonal(component, found[:, component])
+            diagonal.add(face.patches, found)
+            free[face.patches] &= face.stiffness(component) == 0.0
     return Survey(diagonal, free)

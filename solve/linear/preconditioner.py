@@ -148,7 +148,7 @@ class Componentwise:
 
 def leaves_constants(operator: Operator) -> bool:
     """Return whether constants are in an operator's kernel: no Dirichlet face, no reaction, no term on faces."""
-    stiff = (face.stiffness(operator.component) for face in operator.faces.values())
+    stiff = (face.stiffness(operator.component).any() for face in operator.faces.values())
     return not operator.space.dirichlet and not operator.factors[:, 6:].any() and not any(stiff)
 
 
@@ -164,7 +164,7 @@ def _without_local(operator: Operator, diagonal: Array) -> FastDiagonalization:
     diagonal: that of the operator, on the own free coefficients.
     """
     space = operator.space
-    here = {name: face.stiffness(operator.component) for name, face in operator.faces.items()}
+    here = {name: face.stiffness(operator.component).sum() for name, face in operator.faces.items()}
     stiff = {name: float(space.total(here.get(name, 0.0))) for name in FACE_NAMES}
     slopes, masses, averages = _directional_matrices(operator, stiff)
     mean_mass = float(space.total(sum(plane[6:].sum() for plane in operator.factors)))  # of c |det J|, over the cube

@@ -142,7 +142,7 @@ def _stencils(operator: Operator) -> Array:
             there = tuple(slice(c, c + len(h)) for c, h in zip(corner + origin, widths, strict=True))
             lower[place][there] += np.tensordot(reference[:, i, j], cells, 1)
     for face in operator.faces.values():
-        face.add_lumped(operator.component, lower[-1])
+        face.add_lumped(operator.component, lower[-1:])
     space.add(lower)
     lower = lower[:, *space.window]
     for entries, offset in zip(lower, OFFSETS, strict=True):
