@@ -99,9 +99,9 @@ def _known(patches: Sequence[Stated], layout: CoefficientLayout) -> OnPatches:
     for number, patch in enumerate(patches):
         volume, whole = patch.volume, patch.space.whole
         if whole.dirichlet:
-            knots = (row.tobytes() for row in (*volume.knots, *whole.knots))
+            knots = (row.tobytes() for row in volume.knots)
             data = patch.problem.on_boundary if len(patches) > 1 else None
-            groups[volume.degrees, volume.weights is None, whole.degrees, *knots, data].append(number)
+            groups[volume.degrees, volume.weights is None, *knots, whole.key, data].append(number)
     for numbers in groups.values():
         own = [patches[number] for number in numbers]
         boundary_at, whole = own[0].problem.boundary_at, own[0].space.whole
@@ -127,10 +127,11 @@ def _check_laws(patches: Sequence[Stated]) -> bool:
 
 
 def _in_volumes(patches: Sequence[Stated]) -> list[Hashable]:
-    """Return what the law and the source of each patch are made of."""
+    """Return for each patch the number of its law and source among different ones."""
     if len(patches) == 1:
         return [None]
-    return [(patch.problem.in_volume, type(patch.problem.form).__name__) for patch in patches]
+    kinds, numbers = ((patch.problem.in_volume, type(patch.problem.form).__name__) for patch in patches), dict[Hashable, int]()
+    return [numbers.setdefault(kind, len(numbers)) for kind in kinds]
 
 
 def assemble_data(
@@ -179,8 +180,7 @@ def _alike(patches: Sequence[Stated], same: Sequence[Hashable], name: str) -> li
     for place, (patch, law) in enumerate(zip(patches, same, strict=True)):
         space = patch.space
         if name in space.outer and name not in space.dirichlet:
-            knots = (row.tobytes() for row in space.knots)
-            found[space.degrees, *knots, law, patch.problem.key_on(name)].append(place)
+            found[space.key, law, patch.problem.key_on(name)].append(place)
     return [np.array(places) for places in found.values() if has_face(patches[places[0]].space, name)]
 
 

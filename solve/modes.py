@@ -220,7 +220,7 @@ def _inverse(system: System) -> RoughInverse:
     price = price_of(system.unknowns, matrices, len(system.right)) if len(system.load) <= FACTORED else math.inf
 
     def factorize() -> Product | None:
-        return factorized(sparse(system.unknowns, matrices, len(system.right)), system.points)
+        return factorized(sparse(system.unknowns, system.matrix, len(system.right)), system.points)
 
     return RoughInverse(system.operator.matvec, system.preconditioner.matvec, factorize, price)
 

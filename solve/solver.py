@@ -1,6 +1,7 @@
 """Solves any problem: checks it, discretizes it, and solves the linear system."""
 
 import functools
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -17,7 +18,7 @@ from .discretization.on_regions import demand_area, demand_supports
 from .discretization.parted import shared_unknowns
 from .discretization.quadrature import gauss_rule, map_planes
 from .discretization.slab import shared_space
-from .discretization.space import trial_space
+from .discretization.space import TrialSpace, trial_space
 from .forms.boundary_value_problem import BoundaryValueProblem
 from .forms.elasticity import Elasticity
 from .forms.poisson import Poisson
@@ -178,10 +179,15 @@ def _on_patches(
     if not isinstance(problem, BoundaryValueProblem):
         raise TypeError(f"problem must be a Poisson, an Elasticity or a Problem, got {type(problem).__name__}")
     _demand_known_faces(body, problem)
-    placed, patches = problem.on(body), []
-    for i, (volume, own) in enumerate(zip(body, placed.on_patches(body), strict=True)):
-        space = trial_space(volume, options.refine, options.degree, own.dirichlet, body.outer[i])
-        patches.append(PatchProblem(volume, own, shared_space(space, options.comm) if body.is_single else space))
+    placed, spaces = problem.on(body), dict[Any, TrialSpace]()
+    patches = []
+    for volume, own, outer in zip(body, placed.on_patches(body), body.outer, strict=True):
+        key = volume.degrees, *(row.tobytes() for row in volume.knots), own.dirichlet, outer
+        if key not in spaces:
+            spaces[key] = trial_space(volume, options.refine, options.degree, own.dirichlet, outer)
+        patches.append(PatchProblem(volume, own, spaces[key]))
+    if body.is_single:
+        patches = [replace(patches[0], space=shared_space(patches[0].space, options.comm))]
     return placed, patches
 
 

@@ -31,7 +31,7 @@ LAWS = {
 @pytest.mark.parametrize("make", [bent, ring, lambda: iga_nn.Body.from_patches([bent(), bent(1.5, 2.5, 4)])])
 def test_entries_and_factor(law, make):
     system = iga_nn.discretize(make(), law)
-    matrix = sparse(system.unknowns, [patch.matrix for patch in system.patches], len(system.right))
+    matrix = sparse(system.unknowns, system.matrix, len(system.right))
     whole = system.operator @ np.eye(len(system.load))
     assert matrix.toarray() == pytest.approx(whole, abs=1e-12 * np.abs(whole).max())
     solve = factorized(matrix, system.points)
@@ -41,7 +41,7 @@ def test_entries_and_factor(law, make):
 
 def test_a_matrix_that_is_not_positive_has_no_factor():
     system = iga_nn.discretize(bent(), LAWS["strong"])
-    matrix = sparse(system.unknowns, [patch.matrix for patch in system.patches], 3)
+    matrix = sparse(system.unknowns, system.matrix, 3)
     assert factorized(-matrix, system.points) is None
 
 

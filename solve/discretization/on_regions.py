@@ -89,9 +89,8 @@ def _alike(patches: Sequence[Stated], same: Sequence[Hashable], name: str) -> It
             continue
         strong = problem.strong_on(name) if name in space.dirichlet else None
         if strong is None or _may_overlap(problem, name, strong):
-            knots = (row.tobytes() for row in space.knots)
             held = None if strong is None else strong.role
-            found[space.degrees, *knots, law, problem.on_regions, held].append(place)
+            found[space.key, law, problem.on_regions, held].append(place)
     for places in found.values():
         first = patches[places[0]]
         if has_face(first.space, name):

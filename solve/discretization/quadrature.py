@@ -7,7 +7,7 @@ The Gauss rules of a spline space integrate its functions exactly with half as m
 import logging
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
 from scipy.sparse import csr_array, hstack
@@ -38,7 +38,7 @@ class GaussRule:
     points: tuple[Array, Array, Array]
     weights: tuple[Array, Array, Array]
 
-    @property
+    @cached_property
     def shape(self) -> tuple[int, ...]:
         """Return the number of points per direction."""
         return tuple(len(points) for points in self.points)

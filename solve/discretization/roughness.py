@@ -13,7 +13,7 @@ from parameterize.spline.volume import BSplineVolume
 from ..field import Points
 from . import kernels
 from .quadrature import GaussRule, operator_rule
-from .space import TrialSpace
+from .space import TrialSpace, of_each
 from .stack import PatchStack, Piece
 
 SAMPLES = 6  # places a direction, each three neighbouring spans, at which a map is measured
@@ -42,15 +42,14 @@ def rules_of(patches: Sequence[Measured], quadrature: str) -> list[GaussRule]:
 
     quadrature: a name, as in `operator_rule`.
     """
+    spaces = [patch.space for patch in patches]
     rough = roughness(patches) if quadrature == "spline" else [False] * len(patches)
     known: dict[Any, GaussRule] = {}
-    found = []
-    for (_, space, _, _), is_rough in zip(patches, rough, strict=True):
-        key = (space.degrees, *(row.tobytes() for row in (*space.knots, *space.breaks)), *space.glued_ends, is_rough)
-        if key not in known:
-            known[key] = operator_rule(space, quadrature, is_rough)
-        found.append(known[key])
-    return found
+    keys = of_each(lambda space: (space.key, *(row.tobytes() for row in space.breaks), *space.glued_ends), spaces)
+    for space, key, is_rough in zip(spaces, keys, rough, strict=True):
+        if (key, is_rough) not in known:
+            known[key, is_rough] = operator_rule(space, quadrature, is_rough)
+    return [known[key] for key in zip(keys, rough, strict=True)]
 
 
 def rule_of(volume: BSplineVolume, space: TrialSpace, tensor: Tensor, quadrature: str) -> GaussRule:
@@ -66,9 +65,10 @@ def roughness(patches: Sequence[Measured]) -> list[bool]:
     three spans.
     """
     rules: dict[Any, GaussRule] = {}
-    groups = defaultdict(list)
-    for number, (volume, space, _, law) in enumerate(patches):
-        if all(len(breakpoints(knots)) > 3 for knots in space.whole.knots):
+    groups, spaces = defaultdict(list), [patch.space for patch in patches]
+    many = of_each(lambda space: all(len(breakpoints(knots)) > 3 for knots in space.whole.knots), spaces)
+    for number, ((volume, space, _, law), is_many) in enumerate(zip(patches, many, strict=True)):
+        if is_many:
             key = tuple(row.tobytes() for row in space.whole.knots)
             if key not in rules:
                 u, v, w = (_stencils(knots) for knots in space.whole.knots)

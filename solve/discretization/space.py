@@ -2,11 +2,11 @@
 
 import math
 from collections import Counter, defaultdict
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Collection, Hashable, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
-from functools import lru_cache
-from typing import Any
+from functools import cached_property, lru_cache
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from parameterize.spline.patch_groups import groups_of
 from parameterize.spline.volume import AXES, FACE_NAMES, BSplineVolume
 
 Window = tuple[slice, slice, slice]
+Made = TypeVar("Made")
 
 LAYERS = 8  # of elements that are measured at a time: their arrays stay in the cache
 MOST_ELEMENTS = 1e12  # of a trial space: no computer solves on more, and endless halving would not return
@@ -43,7 +44,12 @@ class TrialSpace:
         """Return the space that all processes share."""
         return self
 
-    @property
+    @cached_property
+    def key(self) -> Hashable:
+        """Return what is equal for spaces of the same functions, whatever the data on their faces."""
+        return self.degrees, *(row.tobytes() for row in self.knots)
+
+    @cached_property
     def shape(self) -> tuple[int, ...]:
         """Return the number of basis functions per direction, in u the number of `rows`."""
         return tuple(len(k) - p - 1 for k, p in zip(self.knots, self.degrees, strict=True))
@@ -82,7 +88,7 @@ class TrialSpace:
         """Return whether the functions' derivatives jump somewhere inside."""
         return any(map(_is_only_continuous, self.whole.knots, self.degrees))
 
-    @property
+    @cached_property
     def free(self) -> Window:
         """Return the coefficients of the whole space that boundary data leave free, a box of indices."""
         low, high = ([name in self.dirichlet for name in FACE_NAMES[side::2]] for side in (0, 1))
@@ -94,7 +100,7 @@ class TrialSpace:
         """Return the number of this process, 0 for the first."""
         return 0
 
-    @property
+    @cached_property
     def breaks(self) -> tuple[Array, Array, Array]:
         """Return the ends of the spans over which this process integrates, one array a direction."""
         u, v, w = map(breakpoints, self.knots)
@@ -170,6 +176,13 @@ class TrialSpace:
 
     def send(self, part: Array, after: bool = False) -> None:
         """Send `part` to the process with the free rows before own rows, or after them, where there is one."""
+
+
+def of_each(make: Callable[[TrialSpace], Made], spaces: Sequence[TrialSpace]) -> list[Made]:
+    """Return what a function makes of each space; patches share spaces, and it is called once for each of these."""
+    different = {id(space): space for space in spaces}
+    made = {number: make(space) for number, space in different.items()}
+    return [made[id(space)] for space in spaces]
 
 
 def _is_only_continuous(knots: Array, degree: int) -> bool:

@@ -50,13 +50,12 @@ class Stacked(NamedTuple):
 def stacks_of(patches: Sequence[Stacked], threads: int) -> Iterator[tuple[list[int], PatchStack]]:
     """Yield the stacks of patches with the numbers of their patches, those with the same data one after another."""
     found: dict[Any, dict[Any, list[int]]] = defaultdict(lambda: defaultdict(list))
+    points = {id(rule): _bytes(*rule.points) for rule in {id(patch.rule): patch.rule for patch in patches}.values()}
     for number, (volume, space, rule, same, shape) in enumerate(patches):
         of_map = volume.degrees, volume.shape, volume.weights is None
         found[of_map, space.degrees, space.shape, rule.shape, shape][same].append(number)
     for runs in found.values():
-        numbers = [
-            number for own in runs.values() for number in sorted(own, key=lambda i: _bytes(*patches[i].rule.points))
-        ]
+        numbers = [number for own in runs.values() for number in sorted(own, key=lambda i: points[id(patches[i].rule)])]
         ends = np.cumsum([0, *map(len, runs.values())]).tolist()
         volumes, spaces, of_points, _, _ = zip(*(patches[number] for number in numbers), strict=True)
         yield numbers, PatchStack(spaces, of_points, threads, volumes, ends)
@@ -106,10 +105,15 @@ class PatchStack:
 
         splines: the maps or the trial spaces.
         """
+        objects: dict[Any, int] = {}  # most patches share rules and spaces
         keys: dict[Any, int] = {}
-        each = zip(self.rules, splines, strict=True)
-        parts = (_bytes(*rule.points, *spline.knots) for rule, spline in each)
-        kinds = np.array([keys.setdefault(key, len(keys)) for key in parts], dtype=np.int64)
+        numbers = []
+        for rule, spline in zip(self.rules, splines, strict=True):
+            known = id(rule), *map(id, spline.knots)
+            if known not in objects:
+                objects[known] = keys.setdefault(_bytes(*rule.points, *spline.knots), len(keys))
+            numbers.append(objects[known])
+        kinds = np.array(numbers, dtype=np.int64)
         firsts = np.unique(kinds, return_index=True)[1].tolist()
         return kinds, _joined([self.rules[i].tabulate(splines[i].degrees, splines[i].knots) for i in firsts])
 

@@ -182,6 +182,11 @@ class _Cells:
     ends: Array
     owners: IntArray
 
+    @classmethod
+    def joined(cls, parts: Sequence["_Cells"]) -> "_Cells":
+        """Return the cells of several parts as one."""
+        return cls(np.concatenate([part.ends for part in parts]), np.concatenate([part.owners for part in parts]))
+
     def __len__(self) -> int:
         return len(self.ends)
 
@@ -215,7 +220,7 @@ class _Cutter:
 
     def rule(self) -> SurfaceRule | None:
         """Return the quadrature rule of the faces."""
-        cells, parts, covered = self._spans(), [], np.zeros(len(self.faces))
+        cells, parts, rims, covered = self._spans(), [], [], np.zeros(len(self.faces))
         a_direction = int((len(cells) // len(self.faces)) ** 0.5)
         samples = np.maximum(SAMPLES, -(-self.fewest // a_direction))
         for halvings in range(HALVINGS + 1):
@@ -230,10 +235,11 @@ class _Cutter:
             is_ended = is_least & (4 * self._of_faces(cells, 1.0 * bent) > MOST_CELLS) | (halvings == HALVINGS)
             is_ended |= error <= TOLERANCE * (covered + 0.5 * self._of_faces(cells, sizes * bent))
             on_lines = ~bent | is_ended[cells.owners]
-            parts.append(self._on_lines(cells[on_lines]))
+            rims.append(cells[on_lines])
             cells, samples = cells[~on_lines].quarters, np.maximum(SAMPLES, samples // 2 + 1)  # as close as before
             if not len(cells):
                 break
+        parts.append(self._on_lines(_Cells.joined(rims)))
         found = [part for part in parts if part is not None]
         return _joined(found) if found else None
 
@@ -332,22 +338,16 @@ class _Cutter:
         """Return points on cells at a rim: they lie on lines in the direction in which the code jumps more often."""
         if not len(cells):
             return None
-        parts = [self._lines_along(cells[chosen], along) for along, chosen in enumerate(self._directions(cells))]
-        found = [part for part in parts if part is not None]
-        return _joined(found) if found else None
-
-    def _lines_along(self, cells: _Cells, along: int) -> SurfaceRule | None:
-        """Return points on lines of one direction through cells."""
-        if not len(cells):
-            return None
         t, weights = _unit_rule(max(self.space.degrees) + 1)
         low, size = (np.repeat(row, len(t), axis=0) for row in (cells.ends[:, 0], np.diff(cells.ends, axis=1)[:, 0]))
-        owners = np.repeat(cells.owners, len(t))
+        owners, is_first = np.repeat(cells.owners, len(t)), np.zeros(len(cells), dtype=bool)
+        is_first[self._directions(cells)[0]] = True
+        is_first = np.repeat(is_first, len(t))
         fixed, line_weights = np.tile(t, len(cells)), np.tile(weights, len(cells))
 
         def codes(line: IntArray, s: Array) -> tuple[Array, IntArray]:
-            places = np.empty((len(s), 2))
-            places[:, along], places[:, 1 - along] = s, fixed[line]
+            first, other = is_first[line], fixed[line]
+            places = np.stack([np.where(first, s, other), np.where(first, other, s)], axis=-1)
             across = low[line] + places * size[line]
             return across, self._code(owners[line], across)
 

@@ -56,7 +56,7 @@ class Unknowns(Protocol):
     def chosen(self, coefficients: Sequence[Array]) -> Array:
         """Return the vector (c, ...) of the coefficients (c, n_u, n_v, n_w) of a function on each patch."""
 
-    def completed(self, known: Sequence[Array]) -> list[Array]:
+    def completed(self, known: Sequence[Array]) -> Sequence[Array]:
         """Return all fixed coefficients of each patch from those that its own data fix, (c, n_u, n_v, n_w) each."""
 
     def on_fixed(self, integrals: Sequence[Array]) -> list[Array]:
@@ -125,7 +125,7 @@ class Window:
         (full,) = coefficients
         return np.ascontiguousarray(full[:, *self.space.window])
 
-    def completed(self, known: Sequence[Array]) -> list[Array]:
+    def completed(self, known: Sequence[Array]) -> Sequence[Array]:
         """Return the known coefficients."""
         return list(known)
 
@@ -173,9 +173,10 @@ class Glued:
         numbers, count = shared_numbers([space.shape for space in spaces], interfaces)
         fixed = np.zeros(count, dtype=bool)
         for space, own in zip(spaces, numbers, strict=True):
-            inner = np.zeros(own.shape, dtype=bool)
-            inner[space.free] = True
-            fixed[own[~inner]] = True
+            if space.dirichlet:
+                inner = np.zeros(own.shape, dtype=bool)
+                inner[space.free] = True
+                fixed[own[~inner]] = True
         return cls(tuple(spaces), numbers, count, fixed)
 
     @property
@@ -297,6 +298,9 @@ class Glued:
         """Return for each patch the mask (n_u, n_v, n_w) of the coefficients that its data are the first to fix."""
         taken, found = np.zeros(len(self.fixed), dtype=bool), []
         for space, own in zip(self.spaces, self.numbers, strict=True):
+            if not space.dirichlet:
+                found.append(np.zeros(own.shape, dtype=bool))
+                continue
             given = ~taken[own]
             given[space.free] = False
             places = np.flatnonzero(given)
@@ -307,18 +311,19 @@ class Glued:
             found.append(mask.reshape(own.shape))
         return found
 
-    def completed(self, known: Sequence[Array]) -> list[Array]:
+    def completed(self, known: Sequence[Array]) -> Sequence[Array]:
         """Return the fixed coefficients (c, n_u, n_v, n_w) of each patch, zero elsewhere.
 
         A coefficient has the value of the first patch whose data fix it: other patches may touch a Dirichlet face along
         an edge only.
         """
         every = np.zeros((len(known[0]), len(self.fixed)))
-        for own, is_first, values in zip(self.numbers, self.first_to_fix, known, strict=True):
-            every[:, own[is_first]] = values[:, is_first]
+        for space, own, is_first, values in zip(self.spaces, self.numbers, self.first_to_fix, known, strict=True):
+            if space.dirichlet:
+                every[:, own[is_first]] = values[:, is_first]
         self.add(every)  # others have zero
         self.fill(every)
-        return [every[:, own] for own in self.numbers]
+        return OnPatches(self.layout, len(every), every.ravel()[self._entries(len(every))])
 
     def on_fixed(self, integrals: Sequence[Array]) -> list[Array]:
         """Return integrals of fixed coefficients, summed over all patches, in the first patch whose data fix them."""

@@ -158,6 +158,8 @@ class Condition:
     def on_patch(self, patch: int, solid: str = "", faces: Sequence[str] | None = None) -> Self:
         """Return the condition of one patch of a solid. faces: those of the patch that it has; by default its own."""
         parsed = {name: datum.on_patch(patch, solid) for name, datum in self.parsed.items()}
+        if faces is None and all(own is self.parsed[name] for name, own in parsed.items()):
+            return self
         return self._with(parsed=parsed, faces=self.faces if faces is None else tuple(faces))
 
     def flux_at(self, exact: Exact, x: Array, normal: Array) -> Array:

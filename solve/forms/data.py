@@ -62,6 +62,8 @@ class Datum:
 
     def on_patch(self, patch: int, solid: str = "") -> "Datum":
         """Return the datum on one patch of several, which belongs to a solid; fields are those of the patch."""
+        if not any(isinstance(entry, FieldOnBody) for entry in self.entries):
+            return self
         own = (entry.patches[patch] if isinstance(entry, FieldOnBody) else entry for entry in self.entries)
         return replace(self, entries=tuple(own))
 

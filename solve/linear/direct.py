@@ -8,6 +8,7 @@ from scipy.sparse import coo_array, csc_array, diags_array
 
 from parameterize.arrays import Array, IntArray
 
+from ..discretization.grouped import BodyMatrix
 from ..discretization.operator import MatrixFree
 from ..discretization.unknowns import Unknowns
 from .cholesky import cholesky, touching
@@ -19,8 +20,24 @@ SHARES = tuple(10.0**k for k in range(-15, -7))
 PER_UNKNOWN = 20  # unknowns whose part of a factor takes the time of one iteration: on cubes it is 15 to 80
 
 
-def sparse(unknowns: Unknowns, matrices: Sequence[MatrixFree], components: int) -> csc_array:
-    """Return the matrix (N, N) of a body from those of its patches, for N = components times the unknowns of each.
+def sparse(unknowns: Unknowns, matrix: BodyMatrix, components: int) -> csc_array:
+    """Return the matrix (N, N) of a body, for N = components times the unknowns of each."""
+    return _of_parts(unknowns, matrix.parts, components) + _of_faces(unknowns, matrix, components)
+
+
+def _of_faces(unknowns: Unknowns, matrix: BodyMatrix, components: int) -> csc_array:
+    """Return the part (N, N) of the terms on faces that are in no patch's matrix."""
+    size = components * int(np.prod(unknowns.shape))
+    numbers = unknowns.spread(np.arange(1.0, size + 1.0).reshape(components, *unknowns.shape))  # zero where fixed
+    places = matrix.layout.joined(numbers).flat.astype(np.int64) - 1
+    faces = matrix.matrix_of(matrix.shared_faces).tocoo()
+    row, column = places[faces.row], places[faces.col]
+    free = (row >= 0) & (column >= 0)
+    return coo_array((faces.data[free], (row[free], column[free])), shape=(size, size)).tocsc()
+
+
+def _of_parts(unknowns: Unknowns, matrices: Sequence[MatrixFree], components: int) -> csc_array:
+    """Return the matrix (N, N) of a body from those of its patches.
 
     Functions of which no third function sees two are multiplied in one product, so that a patch of degree p takes
     (2 p + 1)^3 products a component, however fine it is.

@@ -8,6 +8,7 @@ section 5.1).
 from collections import defaultdict
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from scipy.sparse import coo_array, csr_array, kron
@@ -15,8 +16,9 @@ from scipy.sparse import coo_array, csr_array, kron
 from parameterize.arrays import Array, IntArray, Mask
 from parameterize.spline.body import Body, numbers_of_classes
 from parameterize.spline.bspline import collocation
+from parameterize.spline.interface_rows import kinds
 
-from ..discretization.space import TrialSpace
+from ..discretization.space import TrialSpace, of_each
 from ..discretization.unknowns import Glued
 from .nodal import linear, nodes
 
@@ -53,7 +55,7 @@ class Grid:
         for group in self.body.groups:
             alike = defaultdict(list)
             for place, number in enumerate(group.numbers):
-                alike[tuple(row.tobytes() for row in spaces[number].knots)].append(place)
+                alike[spaces[number].key].append(place)
             for chosen in alike.values():
                 numbers = group.numbers[chosen]
                 u, v, w = spaces[numbers[0]].knots
@@ -68,26 +70,24 @@ class Grid:
         chosen = _closest(distances, self.classes)
         if not chosen.any():
             return None
-        made: dict[tuple[bytes, bool], Array] = {}
+        made: dict[Any, TrialSpace] = {}
         spaces = []
-        for space, thin in zip(self.unknowns.spaces, chosen, strict=True):
-            rows = []
-            for knots, is_thinned in zip(space.knots, thin.tolist(), strict=True):
-                key = knots.tobytes(), is_thinned
-                if key not in made:
-                    made[key] = _thinned(knots[1:-1]) if is_thinned else knots[1:-1]
-                rows.append(made[key])
-            spaces.append(linear(space, rows))
+        for space, thin in zip(self.unknowns.spaces, map(tuple, chosen.tolist()), strict=True):
+            if (id(space), thin) not in made:
+                rows = zip(space.knots, thin, strict=True)
+                inner = [_thinned(knots[1:-1]) if is_thinned else knots[1:-1] for knots, is_thinned in rows]
+                made[id(space), thin] = linear(space, inner)
+            spaces.append(made[id(space), thin])
         return Grid(self.body, Glued.of(spaces, self.body.interfaces), self.lengths, self.classes)
 
     def interpolation(self, coarser: "Grid") -> csr_array:
         """Return the matrix (count, coarser.count) from values of trilinear functions on the coarser grid."""
         fine, coarse = self.unknowns, coarser.unknowns
-        kinds: dict[tuple[bytes, ...], list[int]] = {}
+        alike = defaultdict(list)
         for number, (own, other) in enumerate(zip(fine.spaces, coarse.spaces, strict=True)):
-            kinds.setdefault(tuple(row.tobytes() for row in (*own.knots, *other.knots)), []).append(number)
+            alike[own.key, other.key].append(number)
         rows, columns, values = [], [], []
-        for patches in kinds.values():
+        for patches in alike.values():
             matrix = _between(fine.spaces[patches[0]], coarse.spaces[patches[0]])
             here, there = (np.stack([places[i].ravel() for i in patches]) for places in (fine.places, coarse.places))
             rows.append(here[:, matrix.row].ravel())
@@ -103,10 +103,10 @@ class Grid:
 
 def on_nodes(unknowns: Glued) -> Glued:
     """Return the unknowns of trilinear functions on the Greville points of the patches."""
-    spaces = [
-        linear(space, [nodes(*row) for row in zip(space.knots, space.degrees, strict=True)])
-        for space in unknowns.spaces
-    ]
+    spaces = of_each(
+        lambda space: linear(space, [nodes(*row) for row in zip(space.knots, space.degrees, strict=True)]),
+        unknowns.spaces,
+    )
     return Glued(tuple(spaces), unknowns.numbers, unknowns.count, unknowns.fixed)
 
 
@@ -146,10 +146,8 @@ def _lengths(body: Body) -> Array:
 
 def _tied(body: Body) -> IntArray:
     """Return the number (patches, 3) of the class of each direction; interfaces tie the directions along them."""
-    pairs = [
-        (3 * one.first[0] + own, 3 * one.second[0] + other)
-        for one in body.interfaces
-        for own, other, _ in one.directions
-    ]
-    every = np.array(pairs, dtype=np.int64).reshape(-1, 2).T
-    return numbers_of_classes(3 * len(body), every).reshape(-1, 3)
+    rows, pairs = body.interface_rows, [np.empty((2, 0), dtype=np.int64)]
+    for kind, members in kinds(rows, np.zeros(len(body), dtype=np.int64)):
+        for own, other, _ in kind.directions:
+            pairs.append(3 * rows[members][:, [0, 2]].T + np.array([[own], [other]]))
+    return numbers_of_classes(3 * len(body), np.concatenate(pairs, axis=1)).reshape(-1, 3)

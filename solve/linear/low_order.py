@@ -10,7 +10,7 @@ import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from itertools import product
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from scipy.sparse import bsr_array
@@ -21,7 +21,8 @@ from parameterize.spline.body import Body
 from ..discretization.grouped import BodyMatrix, assemble_body
 from ..discretization.groups import CoefficientLayout, OnPatches
 from ..discretization.operator import Operator, diagonals
-from ..discretization.quadrature import GaussRule, gauss_rule
+from ..discretization.quadrature import gauss_rule
+from ..discretization.space import of_each
 from ..discretization.unknowns import Glued
 from .grids import Grid, on_nodes
 from .multigrid import Multigrid
@@ -102,12 +103,8 @@ def trilinear(nodes: Glued, matrix: BodyMatrix) -> bsr_array:
 
 def on_trilinear(nodes: Glued, matrix: BodyMatrix) -> BodyMatrix:
     """Return the operator of the law of another one on trilinear functions, without terms on faces."""
-    rules, laws = dict[Any, GaussRule](), []
-    for law, space in zip(matrix.laws, nodes.spaces, strict=True):
-        key = tuple(row.tobytes() for row in space.knots)
-        if key not in rules:
-            rules[key] = gauss_rule(space)
-        laws.append(law._replace(space=space, rule=rules[key], source=None))
+    each = zip(matrix.laws, nodes.spaces, of_each(gauss_rule, nodes.spaces), strict=True)
+    laws = [law._replace(space=space, rule=rule, source=None) for law, space, rule in each]
     return assemble_body(nodes.layout, laws, matrix.parts[0].threads)[0]
 
 
