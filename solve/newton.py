@@ -226,7 +226,7 @@ class _Balance:
         def low_order(nodes: Glued) -> bsr_array:
             forces = Forces(on_trilinear(nodes, self.forces.matrix), self.forces.forms)
             linear = forces.derivative(NodalBasis.of(glued(self.unknowns)).values(full))
-            return entries_of(nodes, linear.apply, len(right), form.symmetric, self.forces.matrix)
+            return entries_of(nodes, linear.pointwise, len(right), form.symmetric, self.forces.matrix)
 
         operators = [own[0] for own in blocks] if is_diagonalized(self.unknowns, len(right)) else ()
         inverse = preconditioner(self.body, self.unknowns, survey, operators, low_order, is_loose=False)

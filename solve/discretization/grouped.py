@@ -16,9 +16,10 @@ from parameterize.arrays import Array, IntArray
 from parameterize.spline.volume import BSplineVolume
 
 from ..forms.form import Form
+from ..forms.jets import PAIRS
 from . import group_kernels, lane_kernels
 from .groups import CoefficientLayout, OnPatches
-from .operator import FaceTerm, Source, assemble_stack, multiply_law
+from .operator import FaceTerm, Operator, Source, assemble_stack, derivative_of, multiply_law
 from .quadrature import GaussRule
 from .space import TrialSpace
 from .stack import PatchStack, Piece, Stacked, stacks_of
@@ -75,6 +76,20 @@ class StackMatrix:
                 group_kernels.multiply_laws(coefficients, *where, self.laws, result)
 
         stack.on_pieces(multiply)
+
+    def derivative(self, piece: Piece) -> Array:
+        """Return the matrices (m, q, c, 4, c, 4, q_w, q_v) at some points, with weights; see `at_points`."""
+        patches, points = piece
+        here = None if self.factors is None else self.factors[np.ix_(patches, points)]
+        if here is None:
+            return derivative_of(self.forms[patches[0]], self.stack, piece)
+        if self.laws is not None:
+            return _of_constant(here, self.laws[patches])
+        found = np.zeros((*here.shape[:2], 1, 4, 1, 4, *here.shape[3:]))
+        for entry, (a, b) in enumerate(PAIRS):
+            found[:, :, 0, 1 + a, 0, 1 + b] = found[:, :, 0, 1 + b, 0, 1 + a] = here[:, :, entry]
+        found[:, :, 0, 0, 0, 0] = here[:, :, 6:].sum(axis=2)  # of the reaction, where there is one
+        return found
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,6 +157,21 @@ class BodyMatrix:
         return found
 
     @property
+    def every_matrix(self) -> list[StackMatrix]:
+        """Return the matrices of all stacks, of one patch alone, too."""
+        groups, places = self.layout.places
+        found = list(self.stacks)
+        for patch in self.alone:
+            part, where = self.parts[patch], (int(groups[patch]), places[patch : patch + 1])
+            if isinstance(part, Operator):
+                found.append(StackMatrix(part.stack, *where, [self.laws[patch].form], part.factors[None], None))
+            else:
+                laws = None if part.rows is None else law_of(part.form)[None]
+                rows = None if part.rows is None else part.rows[None]
+                found.append(StackMatrix(part.stack, *where, [part.form], rows, laws))
+        return found
+
+    @property
     def every_stack(self) -> list[tuple[PatchStack, int, IntArray]]:
         """Return the stacks of all patches, with the number of the group and the places in it, one patch alone too."""
         threads = self.parts[0].threads
@@ -198,6 +228,15 @@ def _stacked(law: Law) -> Stacked:
     """Return a patch that is stacked with those whose laws store as much at a point."""
     volume, space, rule, form, _, component, same = law
     return Stacked(volume, space, rule, same, (form.components, form.has_reaction, form.constant, component))
+
+
+def _of_constant(rows: Array, laws: Array) -> Array:
+    """Return the matrices of `StackMatrix.derivative` from rows (m, q, 3, 3, ..) and laws (m, c, 3, c, 3)."""
+    count = laws.shape[1]
+    found = np.zeros((*rows.shape[:2], count, 4, count, 4, *rows.shape[4:]))
+    half = np.einsum("mcidj,mqbjwv->mqcidbwv", laws, rows)
+    np.einsum("mqaiwv,mqcidbwv->mqcadbwv", rows, half, out=found[:, :, :, 1:, :, 1:])
+    return found
 
 
 def law_of(form: Form) -> Array:

@@ -1,6 +1,6 @@
 """Computes the forces of a law that is not linear, and their derivative, a matrix stored at the quadrature points."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -143,6 +143,16 @@ class Tangent:
             _add_products(own, factors, *groups[own.group])
         matrix.add_faces(coefficients, result)
         return result
+
+    @property
+    def pointwise(self) -> Iterator[tuple[PatchStack, int, IntArray, Callable[[Piece], Array]]]:
+        """Yield each stack, its group, the places there, and the derivatives at the points of a piece."""
+        for own, factors in zip(self.forces.stacks, self.factors, strict=True):
+
+            def derivative(piece: Piece, factors: Array = factors) -> Array:
+                return factors[np.ix_(*piece)]
+
+            yield own.stack, own.group, own.places, derivative
 
     def block(self, component: int) -> list[Operator]:
         """Return the symmetric part of a component's diagonal block on each patch, for its own gradient and value."""

@@ -308,6 +308,29 @@ def multiply_law(
         group_kernels.spread_splines(fields, which, kinds, q, stack.tables, form.has_reaction, result)
 
 
+def derivative_of(form: Form, stack: PatchStack, piece: Piece) -> Array:
+    """Return the matrices (m, q, c, 4, c, 4, q_w, q_v) of a linear law at some points, with weights.
+
+    They lead from u and its parametric derivatives to the reaction and the flux that are integrated with the test
+    functions' ones.
+    """
+    (patches, points), c = piece, form.components
+    found = np.empty((len(patches), len(points), c, 4, c, 4, *stack.plane_shape))
+    for place, (_, rows, measure, x) in enumerate(stack.geometry(piece)):
+        scale, zero = np.sqrt(np.abs(measure)), np.zeros((len(patches), c, *stack.plane_shape))
+        for d, b in np.ndindex(c, 4):
+            value, slopes = zero.copy(), np.zeros((len(patches), c, 3, *stack.plane_shape))
+            if b == 0:
+                value[:, d] = scale
+            else:
+                slopes[:, d] = rows[:, b - 1]
+            fields = of_law(value), of_law(slopes)
+            flux = of_patches(np.asarray(form.flux(*fields, x), dtype=np.float64), measure)
+            found[:, place, :, 0, d, b] = of_patches(reaction(form, *fields, x), measure) * scale[:, None]
+            found[:, place, :, 1:, d, b] = np.einsum("maiwv,mciwv->mcawv", rows, flux)
+    return found
+
+
 def _demand_invertible(stack: PatchStack, patches: IntArray, q: int, measure: Array) -> None:
     """Raise ValueError where det J is zero on the planes of point `q`, from measure (m, q_w, q_v) = w det J."""
     if measure.all():

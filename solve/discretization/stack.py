@@ -159,6 +159,15 @@ class PatchStack:
                 self.threads,
             )
 
+    @property
+    def pieces(self) -> list[Piece]:
+        """Return pieces that make up all patches and points of u; each has whole layers of elements."""
+        every = np.arange(self.shape[0])
+        if self.is_small:
+            return [(own, every) for own in self._patches()]
+        turns = (colours(self.tables[0][0][kind], self.space.degrees[0], 1) for kind in self.kinds)
+        return [(np.array([i]), points) for i, halves in enumerate(turns) for half in halves for points in half]
+
     def _patches(self) -> list[IntArray]:
         """Return the numbers of the patches in pieces; those of a piece have the same law and data."""
         size = max(1, min(POINTS // math.prod(self.plane_shape), -(-len(self) // (SHARES * self.threads))))

@@ -18,11 +18,13 @@ from scipy.sparse import bsr_array
 from parameterize.arrays import Array, IntArray, Mask
 from parameterize.spline.body import Body
 
+from ..discretization.entry_kernels import add_entries
 from ..discretization.grouped import BodyMatrix, assemble_body
 from ..discretization.groups import CoefficientLayout, OnPatches
 from ..discretization.operator import Operator, diagonals
 from ..discretization.quadrature import gauss_rule
 from ..discretization.space import of_each
+from ..discretization.stack import PatchStack, Piece
 from ..discretization.unknowns import Glued
 from .grids import Grid, on_nodes
 from .multigrid import Multigrid
@@ -31,6 +33,9 @@ from .preconditioner import NO_FACTORS, leaves_constants
 
 HELD = 0.25  # of Nitsche's factor, from which the flux takes: 192 hexahedra take 72 iterations, with 1 they take 99
 LOCAL = 0.5  # the share of the inverted diagonal: on the flange 52 iterations, without it 70, with 2 it is 65
+
+# A stack, its group, the places there, and a function that returns a law's matrices at the points of a piece.
+Pointwise = tuple[PatchStack, int, IntArray, Callable[[Piece], Array]]
 
 
 class Survey(NamedTuple):
@@ -98,7 +103,8 @@ class LowOrder:
 def trilinear(nodes: Glued, matrix: BodyMatrix) -> bsr_array:
     """Return the matrix of the law of another one for trilinear functions, in blocks of components."""
     form = matrix.laws[0].form
-    return entries_of(nodes, on_trilinear(nodes, matrix).apply, form.components, form.symmetric, matrix)
+    stacks = [(own.stack, own.group, own.places, own.derivative) for own in on_trilinear(nodes, matrix).every_matrix]
+    return entries_of(nodes, stacks, form.components, form.symmetric, matrix)
 
 
 def on_trilinear(nodes: Glued, matrix: BodyMatrix) -> BodyMatrix:
@@ -109,14 +115,19 @@ def on_trilinear(nodes: Glued, matrix: BodyMatrix) -> BodyMatrix:
 
 
 def entries_of(
-    nodes: Glued, apply: Callable[[OnPatches], OnPatches], components: int, is_symmetric: bool, matrix: BodyMatrix
+    nodes: Glued, stacks: Iterable[Pointwise], components: int, is_symmetric: bool, matrix: BodyMatrix
 ) -> bsr_array:
-    """Return the matrix that takes trilinear functions to their products, in blocks of components.
+    """Return the matrix of trilinear functions of a law, in blocks of components.
 
-    apply: returns the products. matrix: has the terms on faces, which are lumped. Of products that are not symmetric
-    the symmetric part of the components' own blocks is returned.
+    stacks: those of the law. matrix: has the terms on faces, which are lumped. Of a law that is not symmetric the
+    symmetric part of the components' own blocks is returned.
     """
-    rows, columns, entries = _entries(nodes, apply, components)
+    rows, columns, where = _pattern(nodes)
+    entries = np.zeros((len(rows), components, components))
+    for stack, group, places, derivative in stacks:
+        for piece in stack.pieces:
+            here = where[group][places[piece[0]]]
+            add_entries(derivative(piece), stack.kinds[piece[0]], piece[1], stack.tables, here, entries)
     on_faces = nodes.layout.empty(components)
     for face in matrix.faces:
         found = np.zeros_like(on_faces.of(face.patches))
@@ -135,39 +146,26 @@ def entries_of(
     return bsr_array(0.5 * (blocks + blocks.T), blocksize=(components, components))
 
 
-def _entries(
-    nodes: Glued, apply: Callable[[OnPatches], OnPatches], components: int
-) -> tuple[IntArray, IntArray, Array]:
-    """Return rows (k,), columns (k,) and entries (k, c, c) of a matrix of trilinear functions, sorted by rows.
+def _pattern(nodes: Glued) -> tuple[IntArray, IntArray, list[IntArray]]:
+    """Return rows (k,) and columns (k,) of the entries of trilinear functions, sorted by rows, and their places.
 
-    Nodes of which no third node sees two are multiplied in one product, so that there are 27 products a component.
+    The places (patches, 3, 3, 3, n_u, n_v, n_w) of each group are those of a node and the one beside it whose numbers
+    have these remainders by 3; -1 for none.
     """
-    count, colours = nodes.shape[0], list(product(range(3), repeat=3))
+    count = nodes.shape[0]
     places = nodes.layout.numbers(nodes.places, 1, 0)
     seen = np.concatenate([_seen(nodes.layout, group) for group in range(len(nodes.layout.groups))], axis=1)
     columns = np.where(seen < 0, count, places[seen])
     is_free = (places < count) & (columns < count)
     keys, inverse = np.unique((places * count + columns)[is_free], return_inverse=True)
-    entries = np.zeros((len(keys), components, components))
-    for component in range(components):
-        units = (_unit(nodes.layout, components, component, colour) for colour in colours)
-        found = np.stack([_by_component(apply(unit)) for unit in units], axis=1)
-        for row, values in enumerate(found):
-            entries[:, row, component] = np.bincount(inverse, values[is_free], len(keys))
-    return keys // count, keys % count, entries
-
-
-def _unit(layout: CoefficientLayout, components: int, component: int, colour: Sequence[int]) -> OnPatches:
-    """Return one at the nodes of a colour in one component, zero elsewhere."""
-    unit, (a, b, c) = layout.empty(components), colour
-    for part in unit.in_groups:
-        part[:, component, a::3, b::3, c::3] = 1.0
-    return unit
-
-
-def _by_component(products: OnPatches) -> Array:
-    """Return products as (c, all nodes of patches)."""
-    return np.concatenate([np.moveaxis(part, 1, 0).reshape(part.shape[1], -1) for part in products.in_groups], axis=1)
+    where = np.full(seen.shape, -1)
+    where[is_free] = inverse
+    found = []
+    for group in nodes.layout.groups:
+        shape, first = nodes.layout.shapes[group[0]], nodes.layout.starts[group[0]]
+        part = where[:, first : first + len(group) * math.prod(shape)].reshape(3, 3, 3, len(group), *shape)
+        found.append(np.ascontiguousarray(np.moveaxis(part, 3, 0)))
+    return keys // count, keys % count, found
 
 
 def _seen(layout: CoefficientLayout, group: int) -> IntArray:
