@@ -130,7 +130,10 @@ def _in_volumes(patches: Sequence[Stated]) -> list[Hashable]:
     """Return for each patch the number of its law and source among different ones."""
     if len(patches) == 1:
         return [None]
-    kinds, numbers = ((patch.problem.in_volume, type(patch.problem.form).__name__) for patch in patches), dict[Hashable, int]()
+    kinds, numbers = (
+        ((patch.problem.in_volume, type(patch.problem.form).__name__) for patch in patches),
+        dict[Hashable, int](),
+    )
     return [numbers.setdefault(kind, len(numbers)) for kind in kinds]
 
 
