@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.sparse import bsr_array, csr_array, kron
+from scipy.sparse import bsr_array, csr_array
 
 from parameterize.arrays import Array
 
@@ -112,7 +112,7 @@ class Multigrid:
             coarser = coarser or grid
             interpolation = grid.interpolation(coarser)
             levels.append(GridLevel.of(unknowns, matrix, interpolation))
-            wide = kron(interpolation[unknowns.rows], np.eye(matrix.blocksize[0]), format="bsr")
+            wide = _in_blocks(interpolation[unknowns.rows], matrix.blocksize[0])
             coarse = unknowns.processes.total(wide.T @ matrix @ wide)
             matrix, grid, unknowns = bsr_array(coarse, blocksize=matrix.blocksize), coarser, coarser.unknowns
         solve = _factor(grid, matrix, is_open)
@@ -139,6 +139,12 @@ def _factor(grid: Grid, matrix: bsr_array, is_open: bool) -> Callable[[Array], A
     turned = np.arange(c * grid.count).reshape(-1, c).T.ravel()
     solve = factorized(matrix.tocsr()[turned][:, turned].tocsc(), grid.points, OPEN if is_open else 0.0)
     return solve and (lambda x: solve(x.T.ravel()[:, None]).reshape(c, -1).T.copy())
+
+
+def _in_blocks(matrix: csr_array, c: int) -> bsr_array:
+    """Return a matrix (m, n) that acts on c components alike, in blocks (c, c) as other matrices have them."""
+    m, n = matrix.shape
+    return bsr_array((matrix.data[:, None, None] * np.eye(c), matrix.indices, matrix.indptr), shape=(c * m, c * n))
 
 
 def _turned(x: Array) -> Array:
