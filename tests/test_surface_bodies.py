@@ -54,6 +54,13 @@ def test_a_body_in_a_cavity_is_a_second_one():
     assert len(surface.solids) == 2 and np.array_equal(surface.owners, np.where(radii < 1.5, 1, 0))
 
 
+def test_a_body_that_fills_a_cavity_is_glued_to_its_wall():
+    (vertices, faces), outer = ball(1.0), ball(2.0)
+    surface = surface_from_arrays(*joined(outer, (vertices, faces[:, ::-1]), (vertices, faces)))
+    assert surface.volume == pytest.approx(surface_from_arrays(*outer).volume) and surface.solids == ("", "")
+    assert len(surface.walls.corners) == len(faces) and (surface.shells, len(surface.faces)) == (1, len(outer[1]))
+
+
 def cube(low, size=1.0):
     return CUBE * size + low, TRIANGLES
 

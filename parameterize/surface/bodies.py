@@ -1,5 +1,6 @@
 """The bodies of a surface: copies are dropped, and one is chosen or all are kept."""
 
+from itertools import chain
 from numbers import Integral
 from typing import Literal
 
@@ -8,7 +9,7 @@ import numpy as np
 
 from ..arrays import Array, IntArray
 from .errors import MeshError
-from .geometry import edge_table
+from .geometry import edge_table, signed_volume
 from .holes import Close
 from .mesh_repair import MeshRepair
 from .shells import components, inside, labels_of, sizes_of
@@ -87,6 +88,12 @@ def _volumes(mesh: MeshRepair, groups: list[IntArray]) -> Array:
     return np.asarray(abs(np.bincount(label, np.sum(np.cross(a, b) * c, axis=1) / 6.0)))
 
 
+def _fills(mesh: MeshRepair, groups: list[IntArray], copy: int, original: int) -> bool:
+    """Return whether a copy is a body in a cavity whose wall the original is: it is wound the other way."""
+    volumes = [signed_volume(mesh.points, mesh.faces[groups[number]]) for number in (copy, original)]
+    return volumes[0] * volumes[1] < 0.0 and original in chain(*inside(mesh, groups, range(len(groups))))
+
+
 def _without_copies(mesh: MeshRepair) -> tuple[MeshRepair, list[IntArray], list[str]]:
     """Return the mesh without components whose faces all lie exactly on those of others, its components, a notice."""
     groups = components(mesh.faces)
@@ -99,6 +106,7 @@ def _without_copies(mesh: MeshRepair) -> tuple[MeshRepair, list[IntArray], list[
     np.minimum.at(first, key.ravel(), label)
     owner = first[key.ravel()]
     same = [number for number, group in enumerate(groups) if np.all(owner[group] < number)]
+    same = [number for number in same if not _fills(mesh, groups, number, int(owner[groups[number][0]]))]
     if not same:
         return mesh, groups, []
     dropped = np.isin(label, same)

@@ -64,7 +64,7 @@ def _of_components(raw: RawMesh, asked: Asked) -> tuple[MeshRepair, IntArray, li
 def _of_solids(raw: RawMesh, asked: Asked) -> tuple[MeshRepair, IntArray, list[str]]:
     """Return the meshes of several solids as one, each mended by itself, the solid of each face, and notices."""
     check_face_count(len(raw.faces), asked.max_faces)
-    found = [_of_components(only(replace(raw, notices=()), (solid,)), asked) for solid in raw.solids]
+    found = [_of_solid(raw, number, asked) for number in range(len(raw.solids))]
     meshes, notices = [mesh for mesh, _, _ in found], [lines for _, _, lines in found]
     rows = zip(meshes, raw.solids, strict=True)
     old = np.concatenate([np.where(mesh.old < 0, -1, solid.triangles[mesh.old]) for mesh, solid in rows])
@@ -76,6 +76,16 @@ def _of_solids(raw: RawMesh, asked: Asked) -> tuple[MeshRepair, IntArray, list[s
     owners = np.repeat(np.arange(len(meshes)), [len(mesh.faces) for mesh in meshes])
     told = {line: [k for k, lines in enumerate(notices) if line in lines] for line in dict.fromkeys(chain(*notices))}
     return whole, owners, [*raw.notices, *(f"solid {listed(numbers)}: {line}" for line, numbers in told.items())]
+
+
+def _of_solid(raw: RawMesh, number: int, asked: Asked) -> tuple[MeshRepair, IntArray, list[str]]:
+    """Return one of several solids as `_of_components` returns a mesh. Raises MeshError, with its number and name."""
+    solid = raw.solids[number]
+    try:
+        return _of_components(only(replace(raw, notices=()), (solid,)), asked)
+    except MeshError as error:
+        name = f" ({solid.name!r:.40})" if solid.name else ""
+        raise MeshError(f"solid {number}{name}: {error}") from None
 
 
 def _names(raw: RawMesh, mesh: MeshRepair, owners: IntArray) -> tuple[str, ...]:

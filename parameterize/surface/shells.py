@@ -49,6 +49,16 @@ def inside(mesh: MeshRepair, groups: list[IntArray], outers: Iterable[int]) -> l
     return found
 
 
+def _around(mesh: MeshRepair, groups: list[IntArray]) -> list[list[int]]:
+    """Return the numbers of the components inside which each one lies; a body that fills a cavity lies in its wall."""
+    within = inside(mesh, groups, range(len(groups)))
+    places = [np.unique(mesh.points[np.unique(mesh.faces[group])], axis=0).tobytes() for group in groups]
+    return [
+        [k for k in range(len(groups)) if inner in within[k] or (k < inner and places[k] == places[inner])]
+        for inner in range(len(groups))
+    ]
+
+
 def wound_as_walls(mesh: MeshRepair) -> tuple[MeshRepair, IntArray, list[str]]:
     """Return closed components wound as the walls of bodies, the body of each face (m,), from 0 on, and notices.
 
@@ -56,8 +66,7 @@ def wound_as_walls(mesh: MeshRepair) -> tuple[MeshRepair, IntArray, list[str]]:
     The faces of one component must be wound alike. Raises MeshError for a component that encloses no volume.
     """
     groups = components(mesh.faces)
-    within = inside(mesh, groups, range(len(groups)))
-    around = [[outer for outer in range(len(groups)) if number in within[outer]] for number in range(len(groups))]
+    around = _around(mesh, groups)
     hollow = np.array([len(outer) % 2 == 1 for outer in around])
     volumes = np.array([signed_volume(mesh.points, mesh.faces[group]) for group in groups])
     if np.any(abs(volumes) < LEAST_VOLUME):
