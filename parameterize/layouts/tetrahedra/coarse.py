@@ -17,7 +17,8 @@ LONG, SHORT = 4.0 / 3.0, 0.8  # of the wanted length: longer edges are split, sh
 _POOR = 0.25  # quality of triangles that a collapse may make of better ones
 _GAIN = 0.05  # of quality, for which an edge is flipped
 _GOOD = 0.3  # of triangles that a move may make worse
-_POOREST = 0.02  # of those that a collapse may make
+_LONGER = 1.1  # times the longest edge at a vertex, those after its collapse, where all are long
+_POOREST = 0.003  # of those that a collapse may make
 _SIDES = np.array([[0, 1], [1, 2], [2, 0]])
 
 
@@ -164,9 +165,12 @@ class Coarse:
         up = self.up[triangles]
         before, after = self.qualities(rows, up), self.qualities(new, up)
         sides = np.linalg.norm(self.points[new] - self.points[onto[owners]][:, None], axis=2)
+        former = np.linalg.norm(self.points[rows] - self.points[away[owners]][:, None], axis=2).max(axis=1)
+        longest_there = np.zeros(len(away))
+        np.maximum.at(longest_there, owners, _LONGER * former)
         limit = 0.5 * (longest[new] + longest[onto[owners]][:, None])
         poor = (after < np.minimum(_POOR, 0.9 * before)) | (after < _POOREST)
-        large = (sides > limit).any(axis=1)
+        large = (sides > np.maximum(limit, longest_there[owners][:, None])).any(axis=1)
         return possible & (np.bincount(owners, poor | large, minlength=len(away)) == 0)
 
     def _merge_arcs(self, target: IntArray, away: IntArray) -> None:
