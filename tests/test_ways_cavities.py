@@ -10,6 +10,7 @@ from parameterize.config import preset
 from parameterize.layouts.rods.along_skeleton import LayoutError
 from parameterize.run import given_corners
 from parameterize.surface.surface import surface_from_arrays
+from parameterize.ways.hexahedra import HEXAHEDRA
 from parameterize.ways.mapping_task import MappingTask
 from parameterize.ways.strategy import WAYS, first_way
 
@@ -39,3 +40,10 @@ def test_no_way_of_one_solid_takes_two():
             assert not way.suits(two).applies, way.name
     with pytest.raises(LayoutError, match="none of the ways asked for suits this body"):
         first_way(two, tuple(way for way in WAYS if way.name in WHOLE))
+
+
+def test_hexahedra_of_triangles_take_two_solids_without_a_model():
+    task = of((1.0, 0.0), (1.0, (0, 0, 1)))
+    assert HEXAHEDRA.suits(task).applies
+    solids = HEXAHEDRA.lay(task).nets.solids
+    assert len(np.unique(solids.numbers)) == 2

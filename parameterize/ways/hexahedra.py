@@ -3,6 +3,7 @@
 import numpy as np
 
 from ..layouts.tetrahedra.curving import CurvedMesh
+from ..layouts.tetrahedra.from_triangles import tetrahedra_of_surface
 from ..layouts.tetrahedra.hexahedra import PARTS, spline_of_tetrahedra
 from ..layouts.tetrahedra.mesh import TetrahedralMesh
 from ..layouts.tetrahedra.mesher import MesherError, Sizes, tetrahedra_of_brep
@@ -12,6 +13,7 @@ from ..spline.spline_map import SplineMap
 from ..threads import one_blas_thread
 from .laid import Laid, in_words
 from .mapping_task import MappingTask
+from .sharp import FEW_EDGES, PIECE
 from .way import Attempt, Suits, Way
 
 
@@ -28,7 +30,8 @@ class HexahedraOfTetrahedra(Laid):
             return Suits(False, found)
         hexahedra = in_words(PARTS * len(found.mesh.cells), "hexahedron").replace("hexahedrons", "hexahedra")
         off = found.farthest / _diagonal(task)
-        return Suits(True, f"a part with exact faces: {hexahedra}, nodes within {off:.1e} of them (over diagonal)")
+        faces = "exact faces" if task.surface.brep else "smooth faces"
+        return Suits(True, f"a part with {faces}: {hexahedra}, nodes within {off:.1e} of them (over diagonal)")
 
     def lay(self, task: MappingTask) -> SplineMap:
         """Return the map of the hexahedra at volume 1."""
@@ -54,11 +57,11 @@ def _diagonal(task: MappingTask) -> float:
 def _tetrahedra(task: MappingTask) -> CurvedMesh | str:
     """Return the curved tetrahedra of a part in the user's units; why there are none, "" for a body that is no part."""
     surface, most = task.surface, task.config.blocks
-    if task.given_corners is not None or most is not None or not surface.brep:
+    if task.given_corners is not None or most is not None or not (surface.brep or _is_part(task)):
         return ""
 
     def mesher(sizes: Sizes) -> TetrahedralMesh:
-        return tetrahedra_of_brep(surface.brep, sizes)
+        return tetrahedra_of_brep(surface.brep, sizes) if surface.brep else tetrahedra_of_surface(surface, sizes)
 
     def find() -> CurvedMesh | str:
         try:
@@ -68,3 +71,10 @@ def _tetrahedra(task: MappingTask) -> CurvedMesh | str:
             return str(error)
 
     return task.fact("tetrahedra", find)
+
+
+def _is_part(task: MappingTask) -> bool:
+    """Return whether a surface without exact faces has cavities, several solids, or handles and long sharp edges."""
+    surface = task.surface
+    lengths = surface.features.lengths * surface.scale
+    return not surface.is_plain or bool(surface.genus and lengths[lengths > PIECE].sum() >= FEW_EDGES)

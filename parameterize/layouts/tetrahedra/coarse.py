@@ -156,7 +156,7 @@ class Coarse:
         both = np.concatenate([edges.ends, edges.ends[:, ::-1]])
         near = csr_array((np.ones(len(both)), (both[:, 0], both[:, 1])), shape=(count, count))
         common: Array = np.asarray(near[away].multiply(near[onto]).sum(axis=1)).ravel()
-        possible = common == edges.counts[edges.find(away, onto)]
+        possible = (common == edges.counts[edges.find(away, onto)]) & ~self._lengthens_arcs(away, onto, longest)
         owners, triangles = expanded(self.triangles, count, away)
         rows = self.triangles[triangles]
         stays = (rows != onto[owners][:, None]).all(axis=1)
@@ -172,6 +172,14 @@ class Coarse:
         poor = (after < np.minimum(_POOR, 0.9 * before)) | (after < _POOREST)
         large = (sides > np.maximum(limit, longest_there[owners][:, None])).any(axis=1)
         return possible & (np.bincount(owners, poor | large, minlength=len(away)) == 0)
+
+    def _lengthens_arcs(self, away: IntArray, onto: IntArray, longest: Array) -> Mask:
+        """Return which collapses along curves leave an arc that is too long."""
+        into, out = self._arcs_at()[away].T
+        before, after = self.arcs[into, 0], self.arcs[out, 1]
+        other = np.where(before == onto, after, before)
+        length = np.linalg.norm(self.points[other] - self.points[onto], axis=1)
+        return (into >= 0) & (length > 0.5 * (longest[other] + longest[onto]))
 
     def _merge_arcs(self, target: IntArray, away: IntArray) -> None:
         """Join the two arcs at each vertex that goes away along its curve."""

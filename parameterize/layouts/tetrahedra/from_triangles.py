@@ -9,8 +9,11 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from ...arrays import Array, IntArray
+from ...surface.geometry import connected
+from ...surface.surface import Surface
 from ...surface.topology import crossing_faces
 from .coarse import Coarse
 from .coarsening import coarse_of
@@ -19,8 +22,21 @@ from .mesher import MesherError, Sizes, run_netgen
 from .outline import outline_of
 
 PROGRAM = Path(__file__).with_name("filling_program.py")
+_SAME = 1e-9  # of the diagonal: vertices of walls and of the surface this near are the same
 _TRIES = 4  # coarse triangles that do not meet each other
 _SHORTER = 0.5  # times the edges where they did
+
+
+def tetrahedra_of_surface(surface: Surface, sizes: Sizes) -> TetrahedralMesh:
+    """Return the tetrahedra of the solids inside a surface, in the user's units. Raises MesherError."""
+    walls = surface.walls.corners.reshape(-1, 3)
+    points = np.concatenate([surface.vertices, walls])
+    triangles = np.concatenate([surface.faces, len(surface.vertices) + np.arange(len(walls)).reshape(-1, 3)])
+    same = cKDTree(points).query_pairs(_SAME * float(np.linalg.norm(np.ptp(points, axis=0))), output_type="ndarray")
+    _, first, welded = np.unique(connected(same, len(points)), return_index=True, return_inverse=True)
+    owners = surface.owners if len(surface.owners) else np.zeros(len(surface.faces), dtype=np.int64)
+    sides = np.concatenate([np.stack([owners + 1, 0 * owners], axis=1), surface.walls.solids + 1])
+    return tetrahedra_of_triangles(points[first], welded[triangles], sides, surface.sharp, sizes)
 
 
 def tetrahedra_of_triangles(
