@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 from volumes import mapped
 
+from parameterize.spline.patch_groups import groups_of
 from parameterize.spline.volume import FACE_NAMES, BSplineVolume
 from solve.discretization.space import trial_space
-from solve.discretization.surface_rule import surface_rule
+from solve.discretization.surface_rule import Faces, surface_rule, surface_rules
 from solve.forms.region import Region
 
 
@@ -79,3 +80,21 @@ def test_moments_on_a_curved_face_are_those_of_the_closed_surface():
 
 def test_a_part_of_no_point_has_no_rule():
     assert rules(plate(), "x > 2") == {}
+
+
+def test_faces_of_many_patches_are_cut_as_one_by_one():
+    patches = [
+        BSplineVolume.from_function(lambda u, v, w, k=k: (u + k, v + 0.1 * k * u * v, 0.1 * w + 0.01 * k * u), 4)
+        for k in range(4)
+    ]
+    codes = lambda x, n, owners: ((x[0] - 1.0) ** 2 + x[1] ** 2 < 0.7).astype(np.int64)  # noqa: E731
+    (group,), space = groups_of(patches), trial_space(patches[0])
+    together = surface_rules(Faces.of(group, 2, 1), space, codes, 2.0)
+    alone = [surface_rule(patch, space, 2, 1, codes, 2.0) for patch in patches]
+    assert alone[3] is None and set(together.at.owners) == {0, 1}
+    for owner in (0, 1):
+        own = together.part(np.flatnonzero(together.at.owners == owner))
+        x, single = own.at.x, alone[owner]
+        found = [(own.weights * row).sum() for row in (x[0], x[1], own.at.normal[2])]
+        expected = [(single.weights * row).sum() for row in (single.at.x[0], single.at.x[1], single.at.normal[2])]
+        assert len(own.weights) == len(single.weights) and found == pytest.approx(expected, rel=1e-12)

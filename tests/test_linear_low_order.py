@@ -8,9 +8,10 @@ from parameterize.conjugate_gradients import conjugate_gradients
 from parameterize.spline.body import as_body
 from solve.discretization.unknowns import Glued
 from solve.linear import multigrid
-from solve.linear.grids import Grid
-from solve.linear.low_order import LowOrder
+from solve.linear.grids import Grid, on_nodes
+from solve.linear.low_order import LowOrder, on_trilinear, trilinear
 from solve.linear.nodal import NodalBasis, nodes
+from solve.system import glued
 
 SLENDER = 10.0  # times as long as thick is each cube of a rod
 
@@ -100,3 +101,36 @@ def test_a_cycle_is_symmetric_and_positive(monkeypatch):
 def test_an_elastic_cube_with_free_faces_has_the_preconditioner_of_bodies():
     cube = as_body(iga_nn.BSplineVolume.from_function(lambda u, v, w: (10.0 * u, v, w), 8))
     assert iterations(cube, elastic(fix="u0")) <= 40
+
+
+class Sheared(iga_nn.Form):
+    """A law of two components that is called at the points, with u in its flux and a reaction."""
+
+    components, has_reaction = 2, True
+
+    def flux(self, u, grad, x):
+        return (1.0 + x[0] ** 2) * (grad + 0.3 * grad[::-1])
+
+    def react(self, u, grad, x):
+        return (2.0 + x[1]) * u
+
+
+@pytest.mark.parametrize(
+    "problem",
+    [
+        iga_nn.Poisson(source="1", kappa="1+x", reaction="y", value={"u0": "0"}),
+        elastic(fix="u0"),
+        iga_nn.Problem(Sheared(), source=("1", "0"), value={"u0": ("0", "0")}),
+    ],
+)
+@pytest.mark.parametrize("count", [1, 3])
+def test_the_matrix_of_trilinear_functions_is_that_of_their_products(problem, count):
+    """The matrix is integrated cell by cell; patches alone and stacks have all kinds of laws."""
+    body = rod(count, 1.0)
+    system = iga_nn.discretize(body, problem)
+    nodes_of_body = on_nodes(glued(system.unknowns))
+    matrix = trilinear(nodes_of_body, system.matrix)
+    x = np.random.default_rng(0).standard_normal((problem.form.components, *nodes_of_body.shape))
+    expected = nodes_of_body.collect(on_trilinear(nodes_of_body, system.matrix).apply(nodes_of_body.spread(x)))
+    found = (matrix @ x.T.ravel()).reshape(x.shape[::-1]).T
+    assert found == pytest.approx(expected, abs=1e-12 * np.abs(expected).max())

@@ -53,13 +53,14 @@ class SplineStack:
 
     def at(self, owners: IntArray, points: ArrayLike) -> Array:
         """Return the values (m, c) at parameters (m, 3) of the splines `owners` (m,)."""
-        return self._at(owners, points, (VALUE,))[0]
+        return self.derivatives_at(owners, points, (VALUE,))[0]
 
     def slopes_at(self, owners: IntArray, points: ArrayLike) -> Array:
         """Return the first derivatives (m, c, 3) at parameters (m, 3) of the splines `owners` (m,)."""
-        return np.stack(self._at(owners, points, UNITS), axis=-1)
+        return np.stack(self.derivatives_at(owners, points, UNITS), axis=-1)
 
-    def _at(self, owners: IntArray, points: ArrayLike, orders: Sequence[Orders]) -> list[Array]:
+    def derivatives_at(self, owners: IntArray, points: ArrayLike, orders: Sequence[Orders]) -> list[Array]:
+        """Return partial derivatives (m, c) at parameters (m, 3) of the splines `owners` (m,)."""
         evaluate = partial(evaluate_each, self.degrees, self.knots, self.coefficients, owners, points)
         return self._derivatives(evaluate, orders)
 

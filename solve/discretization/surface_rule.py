@@ -16,8 +16,8 @@ import numpy as np
 from parameterize.arrays import Array, Floats, IntArray, Mask
 from parameterize.spline.orientation import orientations
 from parameterize.spline.patch_groups import PatchGroup, group_of
-from parameterize.spline.spline_stack import SplineStack
-from parameterize.spline.volume import BSplineVolume
+from parameterize.spline.spline_stack import VALUE, SplineStack
+from parameterize.spline.volume import UNITS, BSplineVolume
 
 from .space import TrialSpace
 
@@ -78,12 +78,13 @@ class Faces:
         """Return the points (3, m) of the faces `owners` (m,)."""
         return np.ascontiguousarray(self._surface.at(owners, self.parameters(across)).T)
 
-    def areas(self, owners: IntArray, across: Array) -> Array:
-        """Return the outward normals (3, m), as long as the surface element."""
-        slopes = self._surface.slopes_at(owners, self.parameters(across))
-        area = np.cross(slopes[..., (self.axis + 1) % 3], slopes[..., (self.axis + 2) % 3])
+    def points_and_areas(self, owners: IntArray, across: Array) -> tuple[Array, Array]:
+        """Return the points, and the outward normals (3, m), as long as the surface element."""
+        orders = VALUE, UNITS[(self.axis + 1) % 3], UNITS[(self.axis + 2) % 3]
+        x, first, second = self._surface.derivatives_at(owners, self.parameters(across), orders)
         signs = self.hands[owners] if self.side else -self.hands[owners]
-        return np.ascontiguousarray((signs[:, None] * area).T)
+        area = signs[:, None] * np.cross(first, second)
+        return np.ascontiguousarray(x.T), np.ascontiguousarray(area.T)
 
     def jacobian(self, owners: IntArray, parameters: Array) -> Array:
         """Return the derivatives (m, 3, 3) of the maps."""
@@ -108,7 +109,7 @@ class FacePoints:
     def of(cls, faces: Faces, owners: IntArray, across: Array) -> "FacePoints":
         """Return the points with parameters (m, 2) of the two directions along the faces `owners` (m,)."""
         parameters = faces.parameters(across)
-        x, area = faces.points(owners, across), faces.areas(owners, across)
+        x, area = faces.points_and_areas(owners, across)
         return cls(owners, parameters, x, area, faces.jacobian(owners, parameters))
 
     @property
@@ -197,6 +198,11 @@ class _Cells:
     def sizes(self) -> Array:
         """Return the areas (n,) in the parameters."""
         return np.asarray(np.prod(self.ends[:, 1] - self.ends[:, 0], axis=-1))
+
+    @property
+    def are_whole(self) -> bool:
+        """Return whether all cells are whole faces."""
+        return bool((self.ends[:, 0] == 0.0).all() and (self.ends[:, 1] == 1.0).all())
 
     @property
     def quarters(self) -> "_Cells":
@@ -293,8 +299,13 @@ class _Cutter:
         found = np.empty(len(across), dtype=np.int64)
         for start in range(0, len(across), POINTS):
             here = slice(start, start + POINTS)
-            x = self.faces.points(owners[here], across[here])
-            normal = _unit(self.faces.areas(owners[here], across[here])) if self.needs_normal else np.zeros_like(x)
+            where = owners[here], across[here]
+            if self.needs_normal:
+                x, area = self.faces.points_and_areas(*where)
+                normal = _unit(area)
+            else:
+                x = self.faces.points(*where)
+                normal = np.zeros_like(x)
             found[here] = self.codes(x, normal, owners[here])
         return found
 
@@ -311,7 +322,10 @@ class _Cutter:
         """
         step = 1.0 / (samples - 1)
         t = np.linspace(-step, 1.0 + step, samples + 2)
-        return self._on_grid(cells, np.stack(np.meshgrid(t, t, indexing="ij"), axis=-1))
+        if not cells.are_whole:
+            return self._on_grid(cells, np.stack(np.meshgrid(t, t, indexing="ij"), axis=-1))
+        seen = self._on_grid(cells, np.stack(np.meshgrid(t[1:-1], t[1:-1], indexing="ij"), axis=-1))
+        return np.pad(seen, ((0, 0), (1, 1), (1, 1)), mode="edge")  # there is nothing beyond a face
 
     def _gauss(self, cells: _Cells, codes: IntArray) -> SurfaceRule | None:
         """Return Gauss points on cells of one code each."""
