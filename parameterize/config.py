@@ -28,6 +28,7 @@ WayName = Literal[
     "growth",
     "stiff-growth",
     "last-growth",
+    "last-hexahedra",
 ]
 
 

@@ -1,5 +1,8 @@
 """The way to hexahedra of tetrahedra, which serves every part: its edges stay sharp, and every patch is proved."""
 
+from collections.abc import Sequence
+from dataclasses import dataclass
+
 import numpy as np
 
 from ..layouts.tetrahedra.curving import CurvedMesh
@@ -10,28 +13,41 @@ from ..layouts.tetrahedra.mesher import MesherError, Sizes, tetrahedra_of_brep
 from ..layouts.tetrahedra.part_mesh import curved_tetrahedra
 from ..optimization.endings import Reason
 from ..spline.spline_map import SplineMap
+from ..surface.surface import Surface
 from ..threads import one_blas_thread
-from .laid import Laid, in_words
+from .laid import Laid
 from .mapping_task import MappingTask
 from .sharp import FEW_EDGES, PIECE
+from .tried import Tried
 from .way import Attempt, Suits, Way
 
+FAR = 2e-3  # root mean square distance at volume 1 of a map, above which hexahedra follow it
 
+
+@dataclass(frozen=True)
 class HexahedraOfTetrahedra(Laid):
-    """Make a map of the four hexahedra of each tetrahedron of a coarse mesh, curved onto the part."""
+    """Make a map of the four hexahedra of each tetrahedron of a coarse mesh, curved onto the part.
+
+    is_last: whether it comes after all other ways, for bodies with sharp edges of which these make no good map.
+    """
+
+    is_last: bool = False
 
     origin, why = "hexahedra", Reason.CURVED
     comes_from = "hexahedra of tetrahedra", "curved onto the faces of the part"
 
     def suits(self, task: MappingTask) -> Suits:
-        """Return whether the body is a part whose sharp edges no other way keeps, and a mesher divides it."""
+        """Return whether the body is a part, or other ways have failed, and a mesher divides it."""
+        if task.given_corners is not None or task.config.blocks is not None or len(task.surface.crossings):
+            return Suits(False)
+        if not (has_long_edges(task.surface) if self.is_last else is_part(task.surface)):
+            return Suits(False)
         found = _tetrahedra(task)
         if not isinstance(found, CurvedMesh):
             return Suits(False, found)
-        hexahedra = in_words(PARTS * len(found.mesh.cells), "hexahedron").replace("hexahedrons", "hexahedra")
         off = found.farthest / _diagonal(task)
-        faces = "exact faces" if task.surface.brep else "smooth faces"
-        return Suits(True, f"a part with {faces}: {hexahedra}, nodes within {off:.1e} of them (over diagonal)")
+        what = f"{PARTS * len(found.mesh.cells)} hexahedra of tetrahedra"
+        return Suits(True, f"{what}, with nodes within {off:.1e} of the part (over diagonal)")
 
     def lay(self, task: MappingTask) -> SplineMap:
         """Return the map of the hexahedra at volume 1."""
@@ -44,8 +60,26 @@ class HexahedraOfTetrahedra(Laid):
         """Return whether the map has no faults: proved hexahedra may still meet each other where walls are thin."""
         return Way.serves(self, attempt)
 
+    def follows(self, tried: Sequence[Tried]) -> bool:
+        """Return whether no map that was tried is good enough and near the surface."""
+        return all(not one.serves or one.attempt is None or one.attempt.distance > FAR for one in tried)
+
 
 HEXAHEDRA = HexahedraOfTetrahedra("hexahedra", "curving the hexahedra of tetrahedra onto the part")
+LAST_HEXAHEDRA = HexahedraOfTetrahedra("last hexahedra", "curving hexahedra onto the surface", is_last=True)
+
+
+def is_part(surface: Surface) -> bool:
+    """Return whether a body has exact faces, cavities or several solids, or handles and long sharp edges."""
+    if surface.brep or not surface.is_plain:
+        return True
+    return surface.genus > 0 and has_long_edges(surface)
+
+
+def has_long_edges(surface: Surface) -> bool:
+    """Return whether a body has sharp edges that are long in all."""
+    lengths = surface.scale * surface.features.lengths
+    return float(lengths[lengths > PIECE].sum()) >= FEW_EDGES
 
 
 def _diagonal(task: MappingTask) -> float:
@@ -55,10 +89,8 @@ def _diagonal(task: MappingTask) -> float:
 
 
 def _tetrahedra(task: MappingTask) -> CurvedMesh | str:
-    """Return the curved tetrahedra of a part in the user's units; why there are none, "" for a body that is no part."""
-    surface, most = task.surface, task.config.blocks
-    if task.given_corners is not None or most is not None or not (surface.brep or _is_part(task)):
-        return ""
+    """Return the curved tetrahedra of a body in the user's units, or why there are none."""
+    surface = task.surface
 
     def mesher(sizes: Sizes) -> TetrahedralMesh:
         return tetrahedra_of_brep(surface.brep, sizes) if surface.brep else tetrahedra_of_surface(surface, sizes)
@@ -72,9 +104,3 @@ def _tetrahedra(task: MappingTask) -> CurvedMesh | str:
 
     return task.fact("tetrahedra", find)
 
-
-def _is_part(task: MappingTask) -> bool:
-    """Return whether a surface without exact faces has cavities, several solids, or handles and long sharp edges."""
-    surface = task.surface
-    lengths = surface.features.lengths * surface.scale
-    return not surface.is_plain or bool(surface.genus and lengths[lengths > PIECE].sum() >= FEW_EDGES)

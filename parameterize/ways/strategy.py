@@ -12,6 +12,7 @@
 | growth | shapes that are hard for the network | one cube that grows into the solid |
 | stiff growth | maps not certified, or that meet themselves or end far away | the same, stiffer, turned otherwise |
 | last growth | bodies on which all of these failed | the same, turned again; it may end farther away |
+| last hexahedra | bodies with sharp edges of which these make no good map | hexahedra of curved tetrahedra, as laid |
 """
 
 import logging
@@ -25,7 +26,7 @@ from ..threads import one_blas_thread
 from .blocks import BLOCKS
 from .cost import Cost
 from .growth import GROWTH, LAST, STIFF
-from .hexahedra import HEXAHEDRA
+from .hexahedra import HEXAHEDRA, LAST_HEXAHEDRA
 from .mapping_task import MappingTask
 from .network import NETWORK
 from .planes import PLANES
@@ -37,7 +38,7 @@ from .way import Suits, Way
 
 _log = logging.getLogger(__name__)
 
-WAYS: tuple[Way, ...] = (PLANES, STACKS, HEXAHEDRA, STUBS, BLOCKS, SHARP, NETWORK, GROWTH, STIFF, LAST)
+WAYS: tuple[Way, ...] = (PLANES, STACKS, HEXAHEDRA, STUBS, BLOCKS, SHARP, NETWORK, GROWTH, STIFF, LAST, LAST_HEXAHEDRA)
 _CHECKPOINT = "choice"
 
 

@@ -47,8 +47,8 @@ class CurvedMesh:
 
     @property
     def farthest(self) -> float:
-        """Return the largest distance of a node from its place on the part."""
-        return float(self.misses.max())
+        """Return the largest distance of the mesh from the part: of its nodes, and of its triangles between them."""
+        return max(float(self.misses.max()), float(self.mesh.gaps.max(initial=0.0)))
 
     @property
     def is_proved(self) -> bool:

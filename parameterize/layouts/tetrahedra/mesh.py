@@ -1,6 +1,6 @@
 """Defines TetrahedralMesh, the tetrahedra of a part with their cubic nodes on it, and the numbering of these nodes."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -46,6 +46,8 @@ class TetrahedralMesh:
         The edge of the part.
     nodes : (t, 20, 3) array
         The cubic nodes of each tetrahedron, on the part where the tetrahedron's own edges and faces are.
+    gaps : (b,) array
+        How far each cubic triangle is from the part between its nodes; empty if it is not known.
     """
 
     points: Array
@@ -56,6 +58,13 @@ class TetrahedralMesh:
     segments: IntArray
     curves: IntArray
     nodes: Array
+    gaps: Array = field(default_factory=lambda: np.empty(0))
+
+    def with_gaps(self, gaps: Array) -> "TetrahedralMesh":
+        """Return the mesh with the distances (t, 4) of the faces opposite to the four vertices from the part."""
+        of_faces = np.zeros(len(self.numbering.faces))
+        np.maximum.at(of_faces, self.numbering.cells[:, -len(FACES) :] - self.numbering.first_face, gaps)
+        return replace(self, gaps=of_faces[rows_in(self.numbering.faces, np.sort(self.triangles, axis=1))])
 
     @cached_property
     def numbering(self) -> "CubicNumbering":

@@ -46,7 +46,9 @@ def tetrahedra_of_brep(text: bytes, sizes: Sizes) -> TetrahedralMesh:
         if not target.exists():
             raise MesherError("Netgen ended without tetrahedra")
         with np.load(target) as arrays:
-            mesh = TetrahedralMesh(**arrays)
+            found = dict(arrays)
+    gaps = found.pop("gaps")
+    mesh = TetrahedralMesh(**found).with_gaps(gaps)
     if not len(mesh.cells) or mesh.volumes.min() <= 0.0:
         raise MesherError("Netgen made flat tetrahedra")
     return mesh

@@ -20,6 +20,9 @@ THIRDS = [  # of the weights of the first three vertices, and of the fourth, at 
     *((0, 1, 1, 1), (1, 0, 1, 1), (1, 1, 0, 1), (1, 1, 1, 0)),
 ]
 
+FIFTHS = [(3, 1, 1), (1, 3, 1), (1, 1, 3), (2, 2, 1), (2, 1, 2), (1, 2, 2)]  # of the weights of a face's vertices
+FINE = 6  # the degree of polynomials that are taken for the part itself
+
 
 def limit_memory() -> None:
     """Limit the memory of this process, on systems that can."""
@@ -48,6 +51,24 @@ def cubic_nodes(mesh: Mesh, count: int) -> Any:
     return nodes
 
 
+def powers(weights: Any) -> Any:
+    """Return the twenty cubic monomials (n, 20) of barycentric coordinates (n, 4)."""
+    exponents = [row for row in np.ndindex(4, 4, 4) if sum(row) <= 3]
+    return np.stack([np.prod(weights[:, :3] ** row, axis=1) for row in exponents], axis=1)
+
+
+def gaps(mesh: Mesh, nodes: Any) -> Any:
+    """Return how far (t, 4) the faces of cubic tetrahedra are from the part, those opposite to vertices 0 to 3."""
+    mesh.Curve(FINE)
+    weights = np.array(FIFTHS) / 5.0
+    rows = np.concatenate([np.insert(weights, vertex, 0.0, axis=1) for vertex in range(4)])
+    fine = np.zeros((len(nodes), len(rows), 3))
+    mesh.CalcElementMapping(np.ascontiguousarray(right_handed(rows)[:, :3]), fine)
+    cubic = powers(rows) @ np.linalg.inv(powers(np.array(THIRDS) / 3.0))
+    away = np.linalg.norm(fine - np.einsum("mn,tnx->tmx", cubic, nodes), axis=2)
+    return away.reshape(len(nodes), 4, -1).max(axis=2)
+
+
 def main(source: str, target: str, options: str) -> None:
     """Write the arrays of a TetrahedralMesh; see mesh.py."""
     limit_memory()
@@ -63,6 +84,7 @@ def main(source: str, target: str, options: str) -> None:
         parallel_meshing=False,
     )
     cells = right_handed(corners(mesh.Elements3D(), 4))
+    nodes = cubic_nodes(mesh, len(cells))
     np.savez(
         target,
         points=np.array(mesh.Coordinates()),
@@ -72,7 +94,8 @@ def main(source: str, target: str, options: str) -> None:
         faces=mesh.Elements2D().NumPy()["index"],
         segments=corners(mesh.Elements1D(), 2),
         curves=mesh.Elements1D().NumPy()["index"],
-        nodes=cubic_nodes(mesh, len(cells)),
+        nodes=nodes,
+        gaps=gaps(mesh, nodes),
     )
 
 

@@ -3,11 +3,13 @@
 import logging
 from collections.abc import Callable
 from dataclasses import replace
+from itertools import combinations
 
 import numpy as np
 
+from ...arrays import Array
 from .curving import CurvedMesh, curved, stepped_back
-from .mesh import EDGES, TetrahedralMesh
+from .mesh import TetrahedralMesh
 from .mesher import MesherError, Sizes
 
 _log = logging.getLogger(__name__)
@@ -19,7 +21,7 @@ _GROWTH = (0.7, 0.5, 0.3)
 AROUND = 8  # edges around a full circle: a cubic one of an eighth is 1e-5 of its radius from it
 _TRIES = 4  # meshes, each with shorter edges where the one before steps back too far
 _SHORTER = 0.5  # times the edges there
-_CLOSE = 1e-4  # of the diagonal: a node that steps back less is close enough to the part
+_CLOSE = 2e-4  # of the diagonal: nodes and triangles that are less far from the part are close enough
 
 
 def curved_tetrahedra(mesher: Mesher, diagonal: float) -> CurvedMesh:
@@ -60,7 +62,7 @@ def _fitted(mesh: TetrahedralMesh) -> CurvedMesh:
     found = curved(mesh)
     back = stepped_back(found)
     _log.info(
-        "%d tetrahedra, %d of which are not proved on the part: nodes step back by %.2g at most",
+        "%d tetrahedra, %d of which are not proved on the part: they are %.2g from it at most",
         len(mesh.cells),
         found.rank[0],
         back.farthest,
@@ -68,9 +70,16 @@ def _fitted(mesh: TetrahedralMesh) -> CurvedMesh:
     return back
 
 
-def _shorter(found: CurvedMesh, close: float) -> np.ndarray:
-    """Return the centres (k, 4) of tetrahedra with nodes that step back more than `close`, with shorter edges there."""
-    far = (found.misses > close)[found.mesh.numbering.cells].any(axis=1)
-    corners = found.mesh.points[found.mesh.cells[far]]
-    edges = np.linalg.norm(corners[:, EDGES[:, 0]] - corners[:, EDGES[:, 1]], axis=2)
+def _shorter(found: CurvedMesh, close: float) -> Array:
+    """Return the centres (k, 4) of tetrahedra and triangles that are farther than `close`, with shorter edges there."""
+    mesh = found.mesh
+    far = (found.misses > close)[mesh.numbering.cells].any(axis=1)
+    corners = [mesh.points[mesh.cells[far]], mesh.points[mesh.triangles[np.flatnonzero(mesh.gaps > close)]]]
+    return np.concatenate([_halved(one) for one in corners])
+
+
+def _halved(corners: Array) -> Array:
+    """Return the centres (k, 4) of simplices by their corners (k, n, 3), with shorter edges there."""
+    pairs = np.array(list(combinations(range(corners.shape[1]), 2)))
+    edges = np.linalg.norm(corners[:, pairs[:, 0]] - corners[:, pairs[:, 1]], axis=2)
     return np.column_stack([corners.mean(axis=1), _SHORTER * edges.mean(axis=1)])

@@ -28,8 +28,8 @@ from .common import DAMAGED, Brep, Content, SolidPart, SurfaceFile
 INSTALL = "pip install cadquery-ocp-novtk"
 PROGRAM = Path(__file__).with_name("opencascade.py")
 PATIENCE = 300.0  # seconds
-ANGLE = 0.2  # radians between neighbouring triangles of a curved face: some 31 around a full turn
-SHARE = 1e-3  # of the box's diagonal: the deflection where none is given
+ANGLE = 0.1  # radians between neighbouring triangles of a curved face: some 63 around a full turn
+SHARE = 2e-4  # of the box's diagonal: the deflection where none is given
 LISTED = 8  # names in a message
 SMALLEST = 1e-4  # of OpenCASCADE's unit: a thousand of its tolerances
 MESH = "the solid is a mesh in the file, not a B-rep: its triangles are taken, and deflection does not change them"
