@@ -103,4 +103,3 @@ def _tetrahedra(task: MappingTask) -> CurvedMesh | str:
             return str(error)
 
     return task.fact("tetrahedra", find)
-
