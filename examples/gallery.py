@@ -50,6 +50,7 @@ def runs(full: bool) -> dict[str, Callable[[], Path]]:
         "plate_with_hole": lambda: module("plate_with_hole").main(),
         "pulled_ring": lambda: module("pulled_ring").main(),
         "bracket": lambda: module("bracket").main(),
+        "cad_part": lambda: module("cad_part").main(),
         "batch": lambda: module("batch").main(mapping=mapping),
         **equations,
     }

@@ -283,3 +283,10 @@ def test_validation_runs_what_is_there_and_keeps_the_row_of_what_is_not(formula_
     assert "| santa4 | paper | 194.23 | 38.71 | 232.93 |" in text
     assert "no measurement" in text
     assert text.count("| conch | 0 | 343 |") == 1 and "![error](conch/figure14.png)" in text
+
+
+@pytest.mark.slow
+def test_part_from_cad_is_certified_and_balanced(tmp_path, capsys):
+    load("cad_part").main(tmp_path)
+    said = capsys.readouterr().out
+    assert "certified" in said and "balanced" in said
