@@ -51,7 +51,7 @@ class BoundaryCheck:
 
     injective: True where proved, False where a `meeting` or an `overlap` was found (up to rounding), None where neither
     succeeded.
-    undecided: the number of pairs of pieces left without a proof.
+    undecided: the number of pairs of pieces left without a proof; undecided_patches: the patches that they belong to.
     overlap: whether the body encloses a place twice although its boundary meets nowhere, such as a body inside another
     one; None where that is not known, or the boundary not proved to meet nowhere.
     """
@@ -60,6 +60,7 @@ class BoundaryCheck:
     meeting: Meeting | None
     undecided: int
     overlap: bool | None = None
+    undecided_patches: tuple[int, ...] = ()
 
     def as_dict(self) -> dict[str, Any]:
         """Return entries of the section `parameterization` of report.json."""
@@ -99,7 +100,8 @@ def check_boundary(body: BodyLike, *, max_depth: int = 24) -> BoundaryCheck:
         if hopeless or depth == max_depth:
             break
         pieces, pairs = halved(pieces, pairs)
-    return BoundaryCheck(None, None, len(pairs))
+    left = np.unique(pieces.patches[pairs]).tolist()
+    return BoundaryCheck(None, None, len(pairs), undecided_patches=tuple(left))
 
 
 def _local(body: Body) -> Body:

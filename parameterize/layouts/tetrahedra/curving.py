@@ -9,7 +9,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ...arrays import Array, Mask
+from ...arrays import Array, IntArray, Mask
 from .determinant import determinant_coefficients
 from .mesh import TetrahedralMesh
 from .smoothing import distortion_of, neighbourhood
@@ -86,7 +86,18 @@ def stepped_back(found: CurvedMesh) -> CurvedMesh:
         again = back[cells].any(axis=1)
         bounds[again] = determinant_coefficients(nodes[cells[again]]).min(axis=1)
     misses = (1.0 - _LEVELS[levels]) * np.linalg.norm(displacements, axis=1)
-    return replace(found, nodes=nodes, misses=np.where(found.mesh.on_part, misses, 0.0))
+    return replace(found, nodes=nodes, misses=found.misses + np.where(found.mesh.on_part, misses, 0.0))
+
+
+def pulled_back(found: CurvedMesh, chosen: IntArray, share: float) -> CurvedMesh:
+    """Return the mesh whose nodes of chosen tetrahedra keep a share of their displacements, and the rest is proved."""
+    pulled = np.zeros(len(found.nodes), dtype=bool)
+    pulled[found.mesh.numbering.cells[chosen]] = True
+    straight = found.mesh.straight
+    displacements = found.nodes - straight
+    nodes = straight + np.where(pulled, share, 1.0)[:, None] * displacements
+    misses = np.where(pulled & found.mesh.on_part, (1.0 - share) * np.linalg.norm(displacements, axis=1), 0.0)
+    return stepped_back(replace(found, nodes=nodes, misses=found.misses + misses))
 
 
 def _on_part(mesh: TetrahedralMesh) -> CurvedMesh:
