@@ -20,7 +20,10 @@ THIRDS = [  # of the weights of the first three vertices, and of the fourth, at 
     *((0, 1, 1, 1), (1, 0, 1, 1), (1, 1, 0, 1), (1, 1, 1, 0)),
 ]
 
-FIFTHS = [(3, 1, 1), (1, 3, 1), (1, 1, 3), (2, 2, 1), (2, 1, 2), (1, 2, 2)]  # of the weights of a face's vertices
+SIXTHS = [  # of the weights of a face's vertices: points inside, and on its edges
+    *((4, 1, 1), (1, 4, 1), (1, 1, 4), (2, 2, 2), (3, 2, 1), (3, 1, 2), (2, 3, 1), (1, 3, 2), (2, 1, 3), (1, 2, 3)),
+    *((3, 3, 0), (3, 0, 3), (0, 3, 3), (5, 1, 0), (1, 5, 0), (5, 0, 1), (1, 0, 5), (0, 5, 1), (0, 1, 5)),
+]
 FINE = 6  # the degree of polynomials that are taken for the part itself
 
 
@@ -60,7 +63,7 @@ def powers(weights: Any) -> Any:
 def gaps(mesh: Mesh, nodes: Any) -> Any:
     """Return how far (t, 4) the faces of cubic tetrahedra are from the part, those opposite to vertices 0 to 3."""
     mesh.Curve(FINE)
-    weights = np.array(FIFTHS) / 5.0
+    weights = np.array(SIXTHS) / 6.0
     rows = np.concatenate([np.insert(weights, vertex, 0.0, axis=1) for vertex in range(4)])
     fine = np.zeros((len(nodes), len(rows), 3))
     mesh.CalcElementMapping(np.ascontiguousarray(right_handed(rows)[:, :3]), fine)

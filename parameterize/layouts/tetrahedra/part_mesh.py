@@ -71,7 +71,7 @@ def _fitted(mesh: TetrahedralMesh) -> CurvedMesh:
 
 
 def _shorter(found: CurvedMesh, close: float) -> Array:
-    """Return the centres (k, 4) of tetrahedra and triangles that are farther than `close`, with shorter edges there."""
+    """Return places (k, 4) on tetrahedra and triangles that are farther than `close`, with shorter edges there."""
     mesh = found.mesh
     far = (found.misses > close)[mesh.numbering.cells].any(axis=1)
     corners = [mesh.points[mesh.cells[far]], mesh.points[mesh.triangles[np.flatnonzero(mesh.gaps > close)]]]
@@ -79,7 +79,9 @@ def _shorter(found: CurvedMesh, close: float) -> Array:
 
 
 def _halved(corners: Array) -> Array:
-    """Return the centres (k, 4) of simplices by their corners (k, n, 3), with shorter edges there."""
+    """Return the centres and corners (k, 4) of simplices by their corners (k, n, 3), with shorter edges there."""
     pairs = np.array(list(combinations(range(corners.shape[1]), 2)))
     edges = np.linalg.norm(corners[:, pairs[:, 0]] - corners[:, pairs[:, 1]], axis=2)
-    return np.column_stack([corners.mean(axis=1), _SHORTER * edges.mean(axis=1)])
+    places = np.concatenate([corners, corners.mean(axis=1, keepdims=True)], axis=1)
+    lengths = np.broadcast_to(_SHORTER * edges.mean(axis=1)[:, None, None], (*places.shape[:2], 1))
+    return np.concatenate([places, lengths], axis=2).reshape(-1, 4)
