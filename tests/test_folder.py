@@ -22,7 +22,14 @@ def test_what_check_suggests_is_accepted(kind, given, tmp_path, capsys):
         code = main(["check", str(path), *(word for row in options.values() for word in row), "--json"])
         said = capsys.readouterr()
         if code == 0:
-            break
+            kept = any("--component" in notice for notice in json.loads(said.out)["notices"])
+            if not kept or "--component" in options:
+                break
+            options["--component"] = [
+                "--component",
+                "largest",
+            ]  # a notice says that bodies are kept, and how to take one
+            continue
         assert code == 2 and (found := SUGGESTED.search(said.err)), said.err
         words = found[0].split()
         assert options.get(words[0]) != words, said.err  # the same advice twice leads nowhere
