@@ -212,5 +212,5 @@ def deviation(curve: Curve, knots: Array, degree: int, control: Array) -> float:
     points = collocation(knots, degree, places) @ control
     start, along = curve.points[:-1], np.diff(curve.points, axis=0)
     gap = points[:, None] - start
-    share = np.clip(np.sum(gap * along, axis=-1) / np.sum(along**2, axis=-1), 0.0, 1.0)
+    share = np.clip(np.sum(gap * along, axis=-1) / np.maximum(np.sum(along**2, axis=-1), 1e-300), 0.0, 1.0)
     return float(np.linalg.norm(gap - share[..., None] * along, axis=-1).min(axis=1).max())
