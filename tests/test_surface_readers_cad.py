@@ -138,7 +138,7 @@ def test_deflection_is_the_distance_from_curved_faces(part, tmp_path):
     path = tmp_path / "bracket.step"
     path.write_bytes(part())
     gaps = []
-    for deflection in (0.02, 0.002):
+    for deflection in (0.02, 0.0001):  # the first is met by the angle between triangles already
         surface = load_surface(path, deflection=deflection)
         corners = surface.vertices[surface.faces]
         radii = np.linalg.norm(corners[..., :2] - [6.0, 2.0], axis=2)

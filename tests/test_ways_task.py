@@ -2,6 +2,7 @@
 
 import logging
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -40,7 +41,7 @@ def test_why_a_body_with_handles_gets_blocks_is_told_and_logged(caplog, monkeypa
     task = task_of(preset("fast"))
     way, suits = first_way(task, WAYS)
     assert way is BLOCKS and suits.why.startswith("1 handle, thick branches: ") and not caplog.messages
-    monkeypatch.setattr(BLOCKS.__class__, "make", lambda *_: object())
+    monkeypatch.setattr(BLOCKS.__class__, "make", lambda *_: SimpleNamespace(distance=0.0))
     monkeypatch.setattr(Tried, "serves", True)
     assert attempts(task, WAYS, task.checkpoints)[1] == suits.why and suits.why in caplog.messages
     assert task.seconds["fit"] > 0.0
