@@ -558,3 +558,10 @@ def test_without_opencascade_one_line_says_what_to_install(tmp_path, monkeypatch
 def test_deflection_is_for_solid_models(capsys):
     assert main(["check", "cube", "--deflection", "0.1"]) == 2
     assert "cube: deflection is for files of solid models" in capsys.readouterr().err
+
+
+def test_a_coordinate_that_is_no_number_is_refused(tmp_path):
+    path = tmp_path / "nan.step"
+    path.write_bytes(BRACKET.read_bytes().replace(b"CARTESIAN_POINT('',(", b"CARTESIAN_POINT('',(NaN,", 1))
+    with pytest.raises(MeshError, match="holds a coordinate that is no number"):
+        load_surface(path)

@@ -42,6 +42,7 @@ PLURALS = {"other entity": "other entities", "surface without an outline": "surf
 SHAPES = re.compile(
     rb"\b(?:\w*SHAPE_REPRESENTATION|CONSTRUCTIVE_GEOMETRY_REPRESENTATION)\s*\(\s*(?:'[^']{0,400}+')+\s*,\s*\(([^()]*+)\)"
 )
+NO_NUMBER = re.compile(rb"[(,]\s*[-+]?(?:nan|inf|infinity)\s*[,)]", re.IGNORECASE)  # OpenCASCADE never ends on it
 NUMBER = re.compile(rb"#(\d{1,18})")
 TYPE = re.compile(rb"#(\d{1,18})\s*=\s*\(?\s*(\w{1,80}+)\s*\(")  # of a complex entity, the first of its types
 ANNOTATION = re.compile(rb"=\s*\(?\s*(?:DRAUGHTING_|TESSELLATED_)?ANNOTATION_(?:\w{1,40}_)?OCCURRENCE\s*\(")
@@ -57,6 +58,8 @@ def read_step(file: SurfaceFile) -> Content:
     """Read the solids of a .step, or its faces where it has none. Lengths are in the file's unit."""
     if b"ISO-10303-21" not in file.data[:4096]:
         raise MeshError(f"not a STEP file: it does not begin with ISO-10303-21; {DAMAGED}")
+    if NO_NUMBER.search(file.data):
+        raise MeshError(f"holds a coordinate that is no number; {DAMAGED}")
     return _read(file, "step", step_unit(file.data))
 
 
