@@ -41,7 +41,8 @@ class HexahedraOfTetrahedra(Laid):
 
     def suits(self, task: MappingTask) -> Suits:
         """Return whether the body is a part, or other ways have failed, and a mesher divides it."""
-        if task.given_corners is not None or task.config.blocks is not None or len(task.surface.crossings):
+        crosses = not task.surface.brep and len(task.surface.crossings) > 0  # triangles of exact faces may cross
+        if task.given_corners is not None or task.config.blocks is not None or crosses:
             return Suits(False)
         if not (has_long_edges(task.surface) if self.is_last else is_part(task.surface)):
             return Suits(False)
