@@ -5,7 +5,6 @@ cubic nodes go to smooth curves and surfaces through the vertices of the mesh.
 """
 
 import tempfile
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -24,7 +23,6 @@ from .outline import outline_of
 PROGRAM = Path(__file__).with_name("filling_program.py")
 _SAME = 1e-9  # of the diagonal: vertices of walls and of the surface this near are the same
 _TRIES = 4  # coarse triangles that do not meet each other
-_SHORTER = 0.5  # times the edges where they did
 
 
 def tetrahedra_of_surface(surface: Surface, sizes: Sizes) -> TetrahedralMesh:
@@ -68,10 +66,7 @@ def tetrahedra_of_triangles(
         meeting = np.unique(crossing_faces(coarse.points, coarse.triangles))
         if not len(meeting):
             return _filled(coarse, sides[np.unique(outline.labels, return_index=True)[1]])
-        corners = coarse.points[coarse.triangles[meeting]]
-        lengths = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).mean(axis=1)
-        places = np.column_stack([corners.mean(axis=1), _SHORTER * lengths])
-        sizes = replace(sizes, places=np.concatenate([sizes.places, places]))
+        sizes = sizes.shorter_at(coarse.points[coarse.triangles[meeting]])
     raise MesherError("coarse triangles of the surface meet each other")
 
 

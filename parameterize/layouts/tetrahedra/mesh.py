@@ -10,11 +10,10 @@ from ...arrays import Array, IntArray, Mask
 EDGES = np.array([(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)])
 FACES = np.array([(1, 2, 3), (0, 2, 3), (0, 1, 3), (0, 1, 2)])  # opposite vertices 0, 1, 2 and 3
 ORDER = 3
-NODES = 20  # of a cubic tetrahedron: four vertices, two on each edge, nearer its first end first, and one on each face
 
 
 def _thirds() -> IntArray:
-    """Return three times the barycentric coordinates (20, 4) of the nodes."""
+    """Return three times the barycentric coordinates (20, 4): of vertices, of two nodes an edge, and of one a face."""
     rows = list(ORDER * np.eye(4, dtype=np.int64))
     for first, second in EDGES:
         rows += [2 * rows[first] // 3 + rows[second] // 3, rows[first] // 3 + 2 * rows[second] // 3]

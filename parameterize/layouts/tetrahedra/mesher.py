@@ -4,7 +4,8 @@ import json
 import subprocess
 import sys
 import tempfile
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from itertools import combinations
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +15,7 @@ from .mesh import TetrahedralMesh
 
 PROGRAM = Path(__file__).with_name("netgen_program.py")
 PATIENCE = 120.0  # seconds
+_SHORTER = 0.5  # times the edges where a mesh is made finer
 
 
 class MesherError(Exception):
@@ -32,6 +34,15 @@ class Sizes:
     around: float
     growth: float = 0.7
     places: Array = field(default_factory=lambda: np.empty((0, 4)))
+
+    def shorter_at(self, corners: Array) -> "Sizes":
+        """Return the sizes with half the mean edge at the centres and corners of simplices (k, n, 3)."""
+        pairs = np.array(list(combinations(range(corners.shape[1]), 2)))
+        edges = np.linalg.norm(corners[:, pairs[:, 0]] - corners[:, pairs[:, 1]], axis=2)
+        places = np.concatenate([corners, corners.mean(axis=1, keepdims=True)], axis=1)
+        lengths = np.broadcast_to(_SHORTER * edges.mean(axis=1)[:, None, None], (*places.shape[:2], 1))
+        added = np.concatenate([places, lengths], axis=2).reshape(-1, 4)
+        return replace(self, places=np.concatenate([self.places, added]))
 
 
 def tetrahedra_of_brep(text: bytes, sizes: Sizes) -> TetrahedralMesh:

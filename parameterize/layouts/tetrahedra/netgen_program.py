@@ -12,7 +12,7 @@ import numpy as np
 from netgen.meshing import Mesh, SetMessageImportance
 from netgen.occ import OCCGeometry
 
-LIMITS = ("RLIMIT_AS", 4 << 30)  # bytes of address space: a mesh that needs more is of no use
+MEMORY = 4 << 30  # bytes of address space: a mesh that needs more is of no use
 THIRDS = [  # of the weights of the first three vertices, and of the fourth, at the cubic nodes
     *((3, 0, 0, 0), (0, 3, 0, 0), (0, 0, 3, 0), (0, 0, 0, 3)),
     *((2, 1, 0, 0), (1, 2, 0, 0), (2, 0, 1, 0), (1, 0, 2, 0), (2, 0, 0, 1), (1, 0, 0, 2)),
@@ -33,7 +33,7 @@ def limit_memory() -> None:
         import resource
     except ImportError:
         return
-    resource.setrlimit(getattr(resource, LIMITS[0]), (LIMITS[1], LIMITS[1]))
+    resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
 
 
 def corners(elements: Any, count: int) -> Any:

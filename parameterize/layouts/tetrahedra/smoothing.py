@@ -23,7 +23,7 @@ _REGULAR = np.array([[1, 1, 1], [-1, 1, -1], [1, -1, -1], [-1, -1, 1]]) / np.sqr
 
 
 @dataclass(frozen=True, eq=False)
-class Distortion:
+class CubicDistortion:
     """The distortion of some cubic tetrahedra, of which some nodes are free.
 
     cells: (t, 20), the nodes of each. free: (m,), numbers of nodes. scales: (t,), one over the edges of the regular
@@ -78,14 +78,14 @@ def neighbourhood(cells: IntArray, chosen: Mask) -> Mask:
     return np.asarray(touched[cells[:, :4]].any(axis=1))
 
 
-def distortion_of(cells: IntArray, nodes: Array, near: Mask, fixed: Mask) -> Distortion:
+def distortion_of(cells: IntArray, nodes: Array, near: Mask, fixed: Mask) -> CubicDistortion:
     """Return the distortion of the tetrahedra that are `near` (t,): nodes that others share, or are `fixed`, stay."""
     free = np.zeros(len(nodes), dtype=bool)
     free[cells[near]] = True
     free[cells[~near]] = False
     corners = nodes[cells[near, :4]]
     edges = np.linalg.norm(corners[:, EDGES[:, 0]] - corners[:, EDGES[:, 1]], axis=2)
-    return Distortion(cells[near], np.flatnonzero(free & ~fixed), 1.0 / np.sqrt((edges**2).mean(axis=1)))
+    return CubicDistortion(cells[near], np.flatnonzero(free & ~fixed), 1.0 / np.sqrt((edges**2).mean(axis=1)))
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
