@@ -62,7 +62,7 @@ class MixedSystem(System):
         return forces, self.pressures.transposed @ self.divergence.of_displacement(on_patches).flat
 
     def _coupling(self, p: Array) -> Pair:
-        forces, volumes = _parted(self.divergence.of_pressure(self._spread(p)))
+        forces, volumes = parted(self.divergence.of_pressure(self._spread(p)))
         return self.unknowns.collect(forces), self.pressures.transposed @ volumes.flat
 
     @property
@@ -111,12 +111,12 @@ class MixedSystem(System):
     def _balance(self, full: Sequence[Array]) -> Balance:
         layout = self.matrix.layout
         u, p = layout.joined([own[:3] for own in full]), layout.joined([own[3:] for own in full])
-        forces, _ = _parted(self.divergence.of_pressure(p))
+        forces, _ = parted(self.divergence.of_pressure(p))
         faces = [PressedFace.of(face, p.of(face.patches)) for face in self.matrix.weak]
         return balance(self.problem, self.patches, self.unknowns, faces, u, forces + self.matrix.apply(u))
 
 
-def _parted(both: OnPatches) -> tuple[OnPatches, OnPatches]:
+def parted(both: OnPatches) -> tuple[OnPatches, OnPatches]:
     """Return the first three components and the fourth one on each patch."""
     layout = both.layout
     forces, volumes = layout.empty(3), layout.empty(1)

@@ -1,0 +1,1 @@
+"""Answers what a user asks of a solution, each quantity with an interval."""
