@@ -146,3 +146,24 @@ def test_formulas_choose_but_are_then_not_smooth():
     iga_nn.Poisson(source="where(x < 1, 1, 0)")
     with pytest.raises(ExpressionError, match=r"write where\(condition, a, b\)"):
         Expression("x < 1")
+
+
+@pytest.mark.parametrize(
+    ("text", "mark"),
+    [
+        ("bore 2", "group bore 2"),
+        ("face12 and z > 1", "group face12"),
+        ("radius 8.50", "group radius 8.5"),
+        ("plane z = -0.0", "group plane z=0"),
+        ("not fillet  3", "group fillet 3"),
+    ],
+)
+def test_names_of_a_solid_model_are_groups(text, mark):
+    region = Region(text)
+    assert region._marks[-1] == mark and region.needs_surface
+
+
+@pytest.mark.parametrize("text", ["bore", "bore 2.5", "plane q=1", "radius", "facet3"])
+def test_what_is_no_name_of_a_face_is_refused(text):
+    with pytest.raises(ExpressionError):
+        Region(text)

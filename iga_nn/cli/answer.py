@@ -105,9 +105,14 @@ def _patch(part: reports.Report) -> str:
 def surface_in_words(facts: dict[str, Any]) -> str:
     """Return the facts of `check` about a surface as text, with a line for each group of faces and each region."""
     others = {key: value for key, value in facts.items() if key not in ("groups", "regions")}
-    groups = [f"{'group:':16s} {g['name']}, {g['faces']} faces, area {g['area']:.6g}" for g in facts["groups"]]
+    groups = [f"{'group:':16s} {_group(found)}" for found in facts["groups"]]
     regions = [f"{'region:':16s} {_region(found)}" for found in facts.get("regions", ())]
     return "\n".join([facts_in_words(others), *groups, *regions])
+
+
+def _group(found: dict[str, Any]) -> str:
+    shape = f": {found['shape']}" if "shape" in found else ""
+    return f"{found['name']}, {found['faces']} faces, area {found['area']:.6g}{shape}"
 
 
 def _region(found: dict[str, Any]) -> str:

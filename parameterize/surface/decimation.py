@@ -89,6 +89,7 @@ def _labelled(surface: Surface, smaller: Surface) -> Surface:
         smaller,
         groups=renumbered(surface.groups, nearest),
         brep=surface.brep,
+        shapes=surface.shapes,
         brep_faces=surface.brep_faces[nearest],
         solids=surface.solids,
         owners=surface.owners[nearest],

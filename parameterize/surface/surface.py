@@ -96,6 +96,8 @@ class Surface(Brief, Shown):
     walls : Walls
         The triangles between solids that touch, which are not among `faces`: `corners` (k, 3, 3) in the user's units,
         and `solids` (k, 2), the two solids of each.
+    shapes : dict of str to str
+        The shapes of some groups of a solid model in words, such as "plane through (0, 2, 3), normal (-1, 0, 0)".
 
     Examples
     --------
@@ -125,6 +127,7 @@ class Surface(Brief, Shown):
     solids: tuple[str, ...] = ("",)
     owners: IntArray = field(default_factory=lambda: np.empty(0, dtype=np.int64))
     walls: Walls = NO_WALLS
+    shapes: Mapping[str, str] = field(default_factory=dict)
 
     def to_unit(self, points: ArrayLike) -> Array:
         """Return points (..., 3) in the user's units as placed points."""
@@ -205,6 +208,7 @@ class Surface(Brief, Shown):
             },
             "groups": [
                 {"name": name, "faces": len(numbers), "area": self.part.area(numbers)}
+                | ({"shape": self.shapes[name]} if name in self.shapes else {})
                 for name, numbers in self.groups.items()
             ],
             "notices": list(self.notices),
@@ -377,7 +381,7 @@ def _gate(raw: RawMesh, name: str, source: str, asked: Asked) -> Surface:
     solids, mended = mend(raw, replace(asked, component=component))
     repaired = solids.mesh
     points, triangles = repaired.points, repaired.faces
-    doubts = topology.slivers(points, triangles, repaired.where)
+    doubts = [] if raw.brep else topology.slivers(points, triangles, repaired.where)  # those of a reader are no fault
     crossings = solids.crossings
     if len(crossings):
         doubts.append(topology.describe_crossings(repaired.vertices, triangles, crossings))
@@ -403,4 +407,5 @@ def _gate(raw: RawMesh, name: str, source: str, asked: Asked) -> Surface:
         solids=solids.names,
         owners=solids.owners,
         walls=solids.walls,
+        shapes=raw.shapes,
     )

@@ -22,6 +22,11 @@ from .parser import SCALED, VARIABLES, Decider, ExpressionError, Translator, sca
 NORMAL = ("nx", "ny", "nz")
 CALL = re.compile(r"\b(face|box)\s*\(([^()]*)\)")
 PATCH_FACE = re.compile(r"\bp\d+_[uvw][01]\b")
+NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
+NAMED = re.compile(  # of a solid model: a face, or what its reader calls some of them
+    rf"\b(?:(?P<kind>bore|shaft|fillet|round)\s+(?P<number>\d+)|face(?P<face>\d+)"
+    rf"|radius\s+(?P<radius>{NUMBER})|plane\s+(?P<axis>[xyz])\s*=\s*(?P<place>{NUMBER}))(?![\w.])"
+)
 GROUP = re.compile(r"""group:("[^"]*"|'[^']*'|[^\s()]+)""")
 ANGLE = 30.0  # degrees between neighbouring triangles beyond which an edge is sharp
 # The tolerance of positions, of the diagonal of the points' box, and of the components of normals: rounding is some
@@ -97,8 +102,9 @@ class Region:
         nz, such as "nz > 0.99 and abs(x) < 2": comparisons, and, or, not, and the functions of formulas. Also
         conditions: u0, u1, v0, v1, w0, w1, the images of the cube's faces, and p2_u0 that of patch 2 of several;
         box(x0, y0, z0, x1, y1, z1);
-        group:NAME, a group of the input mesh; and face(x, y, z), the part of the surface around the place nearest to
-        that point, up to edges that bend by more than 30 degrees, or by a fourth number in degrees.
+        group:NAME, a group of the input mesh, of a solid model also without `group:` by its names, face4, bore 2,
+        shaft 1, fillet 1, round 3, radius 8, plane z=0; and face(x, y, z), the part of the surface around the place
+        nearest to that point, up to edges that bend by more than 30 degrees, or by a fourth number in degrees.
     surface : Part, optional
         The part's surface mesh (`result.boundary.part`), which group:NAME and face(x, y, z) need. Where it is known,
         normals are those of its triangles: a spline rounds the edges off, and there its own normals turn.
@@ -139,6 +145,7 @@ class Region:
             return f" _mark{len(marks) - 1} "
 
         text = GROUP.sub(lambda found: mark("group", found[1].strip("'\"")), self.text)
+        text = NAMED.sub(lambda found: mark("group", _name(found)), text)
         text = CALL.sub(lambda found: mark(found[1], found[2]), text)
         text = PATCH_FACE.sub(lambda found: mark("patch", found[0]), text)
         names = [f"_mark{i}" if i >= len(FACE_NAMES) else name for i, name in enumerate(marks)]
@@ -303,6 +310,17 @@ def _change(a: Jet, b: Jet) -> Any:
     """Return by how much a difference of two numbers changes where a point moves by the tolerance."""
     slopes = [np.abs(slope) for slope in (a - b).gradient]
     return np.nan_to_num(sum(slopes), nan=0.0, posinf=0.0)  # of a root at zero the slope is no number
+
+
+def _name(found: re.Match[str]) -> str:
+    """Return the group of a face that a text names: "bore 2", "face4", "radius 8", "plane z=0"."""
+    if found["kind"]:
+        return f"{found['kind']} {int(found['number'])}"
+    if found["face"]:
+        return f"face{int(found['face'])}"
+    if found["radius"]:
+        return f"radius {float(found['radius']):.6g}"
+    return f"plane {found['axis']}={float(found['place']) + 0.0:.6g}"
 
 
 def _numbers(argument: str) -> list[float]:

@@ -1,5 +1,7 @@
 """STEP and IGES by OpenCASCADE, in the package cadquery-ocp-novtk: faces of the B-rep become groups face1, face2, ...
 
+Bores, fillets and the like are groups, too (`named_faces.py`).
+
 It runs in a process of its own (`opencascade.py`): on a damaged file the library may end it, and it prints as it likes.
 It works in millimetres, or in the file's unit where that is smaller; lengths are brought back to the file's unit.
 Of a STEP file, annotations and geometry of which it makes no shape are found in its text: representations and their
@@ -19,11 +21,12 @@ from typing import Any
 
 import numpy as np
 
-from ...arrays import IntArray
+from ...arrays import Array, IntArray
 from ..errors import MeshError, check_face_count
-from ..groups import gathered
+from ..groups import MOST_GROUPS, gathered
 from .cad_units import Unit, iges_unit, step_unit
 from .common import DAMAGED, Brep, Content, SolidPart, SurfaceFile
+from .named_faces import described, named
 
 INSTALL = "pip install cadquery-ocp-novtk"
 PROGRAM = Path(__file__).with_name("opencascade.py")
@@ -75,20 +78,51 @@ def _read(file: SurfaceFile, kind: str, unit: Unit) -> Content:
     _check(facts, len(arrays["faces"]), left_out)
     check_face_count(len(arrays["faces"]), file.max_faces)
     faces, owners, own, together = arrays["labels"].T
-    groups = gathered((f"face{value}", np.flatnonzero(faces == value)) for value in np.unique(faces).tolist())
+    groups, shapes = _groups(faces, facts)
     names = facts["names"]
     rows = [np.flatnonzero(owners == k) for k in range(1, len(names) + 1)]
     solids = (SolidPart(names[k], row, _brep(arrays, k + 1, own[row])) for k, row in enumerate(rows))
+    vertices, triangles = _joined(arrays["vertices"], arrays["faces"], owners)
     return Content(
-        arrays["vertices"] / unit.factor,
-        arrays["faces"].tolist(),
+        vertices / unit.factor,
+        triangles.tolist(),
         (*unit.notices, *_notices(facts, left_out)),
         groups,
         unit=unit.name,
         solids=tuple(solids),
         brep=_brep(arrays, 0, together),
         conflict=_conflict(facts),
+        shapes=shapes,
     )
+
+
+def _joined(vertices: Array, triangles: IntArray, owners: IntArray) -> tuple[Array, IntArray]:
+    """Return vertices (n, 3) and triangles (m, 3) in which faces of one solid have common vertices.
+
+    owners: (m,), the solid of each triangle. OpenCASCADE gives each face vertices of its own, at the same places.
+    """
+    owner = np.zeros(len(vertices))
+    owner[triangles.ravel()] = np.repeat(owners, 3)
+    _, first, joined = np.unique(np.column_stack([owner, vertices]), axis=0, return_index=True, return_inverse=True)
+    order = np.argsort(first)  # vertices keep their order
+    place = np.empty_like(order)
+    place[order] = np.arange(len(order))
+    return vertices[first[order]], place[joined.ravel()][triangles]
+
+
+def _groups(faces: IntArray, facts: Mapping[str, Any]) -> tuple[dict[str, IntArray], dict[str, str]]:
+    """Return the groups of triangles by face and by the names of faces, and in words the shapes of some of them.
+
+    faces: (m,), the face of each triangle, counted from 1. Names are left out where they would be too many.
+    """
+    present, shapes = np.unique(faces).tolist(), facts["shapes"]
+    names = named(shapes, facts["size"]) if len(present) <= MOST_GROUPS // 2 else {}
+    if len(present) + len(names) > MOST_GROUPS:
+        names = {}
+    rows = [(f"face{value}", np.flatnonzero(faces == value)) for value in present]
+    rows += [(name, np.flatnonzero(np.isin(faces, numbers))) for name, (numbers, _) in names.items()]
+    words = {f"face{value}": described(shapes[value - 1]) for value in present} if shapes else {}
+    return gathered(rows), words | {name: told for name, (_, told) in names.items() if told}
 
 
 def _brep(arrays: Mapping[str, Any], number: int, faces: IntArray) -> Brep | None:

@@ -3,7 +3,7 @@
 import io
 import logging
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from dataclasses import dataclass, field
 from typing import Any
@@ -68,9 +68,9 @@ class Content:
     """The content of a surface file.
 
     vertices: (n, 3). polygons: the vertex numbers of each face, counted from 0; they may be out of range.
-    notices: one line each on data that were left out or changed. groups: numbers of polygons by name. unit: of lengths,
-    "" where the format has none. solids: of a solid model, and brep. conflict: why they
-    cannot be taken together, "" where they can.
+    notices: one line each on data that were left out or changed. groups: numbers of polygons by name. shapes: of some
+    groups, in words. unit: of lengths, "" where the format has none. solids: of a solid model, and brep. conflict: why
+    they cannot be taken together, "" where they can.
     """
 
     vertices: Array
@@ -81,6 +81,7 @@ class Content:
     solids: Solids = ()
     brep: Brep | None = None
     conflict: str = ""
+    shapes: Mapping[str, str] = field(default_factory=dict)
 
 
 def most_bytes(max_faces: int) -> int:

@@ -1,8 +1,8 @@
 """Reading a surface file: its bytes within a limit, the reader of its format, checks, triangles."""
 
 import hashlib
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from itertools import chain
 from pathlib import Path
 
@@ -56,7 +56,7 @@ class RawMesh:
     """Triangles before any repair: vertices (n, 3), faces (m, 3) with valid indices, groups; sha256 of the source.
 
     unit: of lengths, "" where it is not known. solids: of a solid model, and brep. conflict: why they cannot be taken
-    together, "" where they can.
+    together, "" where they can. shapes: of some groups, in words.
     """
 
     vertices: Array
@@ -68,6 +68,7 @@ class RawMesh:
     solids: Solids = ()
     brep: Brep | None = None
     conflict: str = ""
+    shapes: Mapping[str, str] = field(default_factory=dict)
 
 
 def read_mesh(path: Path, max_faces: int, deflection: float | None = None) -> RawMesh:
@@ -112,6 +113,7 @@ def read_mesh(path: Path, max_faces: int, deflection: float | None = None) -> Ra
         content.solids,
         content.brep,
         content.conflict,
+        content.shapes,
     )
 
 

@@ -17,6 +17,7 @@ import numpy as np
 from OCP.Bnd import Bnd_Box
 from OCP.BOPAlgo import BOPAlgo_Builder
 from OCP.BRep import BRep_Builder, BRep_Tool
+from OCP.BRepAdaptor import BRepAdaptor_Surface
 from OCP.BRepBndLib import BRepBndLib
 from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeSolid, BRepBuilderAPI_Sewing, BRepBuilderAPI_Transform
 from OCP.BRepCheck import BRepCheck_Analyzer
@@ -24,7 +25,8 @@ from OCP.BRepGProp import BRepGProp
 from OCP.BRepLib import BRepLib
 from OCP.BRepMesh import BRepMesh_IncrementalMesh
 from OCP.BRepTools import BRepTools
-from OCP.gp import gp_Pnt, gp_Trsf
+from OCP.GeomAbs import GeomAbs_Cone, GeomAbs_Cylinder, GeomAbs_Plane, GeomAbs_Sphere, GeomAbs_Torus
+from OCP.gp import gp_Pnt, gp_Trsf, gp_Vec
 from OCP.GProp import GProp_GProps
 from OCP.IFSelect import IFSelect_RetDone
 from OCP.IGESControl import IGESControl_Reader
@@ -58,6 +60,13 @@ CLOSE = 1e-6  # of the box's diagonal: solids that are as close touch
 SEWN = 1e-5  # of the box's diagonal: gaps between the faces of a model without solids that are sewn
 LEAST = 1e-6  # of its unit: its tolerance is a tenth of that, and smaller deflections are refused
 NO_AREA = 1e-10  # of the square of the diagonal: a face that needs no triangles, as its neighbours meet over it
+
+ROUND = {
+    GeomAbs_Cylinder: "cylinder",
+    GeomAbs_Cone: "cone",
+    GeomAbs_Sphere: "sphere",
+    GeomAbs_Torus: "torus",
+}
 
 Arrays = dict[str, Any]
 
@@ -299,6 +308,54 @@ def triangles(bodies: Bodies) -> tuple[Arrays, list[tuple[int, float]]]:
     return arrays, missing
 
 
+def shapes_of(bodies: list[Any], factor: float) -> list[dict[str, Any]]:
+    """Return the shape of each face of the given bodies, in a unit of `factor` of its own; see `face_shapes.py`."""
+    faces = (face for body in bodies for face in parts(body, TopAbs_FACE).values())
+    return [shape_of(TopoDS.Face(face), factor) for face in faces]
+
+
+def shape_of(face: Any, factor: float) -> dict[str, Any]:
+    """Return the kind of a face's surface, its place, and of a round one its radius, its turn and its side."""
+    surface = BRepAdaptor_Surface(face)
+    kind = surface.GetType()
+    spans = surface.FirstUParameter(), surface.LastUParameter(), surface.FirstVParameter(), surface.LastVParameter()
+    point, along, across = gp_Pnt(), gp_Vec(), gp_Vec()
+    surface.D1(0.5 * (spans[0] + spans[1]), 0.5 * (spans[2] + spans[3]), point, along, across)
+    normal = row(along.Crossed(across)) * (-1.0 if face.Orientation() == TopAbs_REVERSED else 1.0)
+    if kind == GeomAbs_Plane:
+        return {"kind": "plane", "centre": list(row(point) / factor), "normal": list(unit(normal))}
+    if kind not in ROUND:
+        return {"kind": "free"}
+    name, element = ROUND[kind], getattr(surface, ROUND[kind].capitalize())()
+    centre, turn = row(element.Location()), spans[1] - spans[0]
+    found = {"kind": name, "centre": list(centre / factor), "turn": turn}
+    if name != "sphere":
+        found["axis"] = list(row(element.Axis().Direction()))
+    middle = centre
+    if name == "torus":
+        found |= {"radius": element.MinorRadius() / factor, "ring": element.MajorRadius() / factor}
+        flat = row(point) - centre - np.dot(row(point) - centre, found["axis"]) * np.array(found["axis"])
+        middle = centre + element.MajorRadius() * unit(flat)
+    elif name == "cone":
+        found["angle"] = abs(element.SemiAngle())
+    else:
+        found["radius"] = element.Radius() / factor
+    away = row(point) - middle
+    if "axis" in found and name != "torus":
+        away = away - np.dot(away, found["axis"]) * np.array(found["axis"])
+    return found | {"hollow": bool(np.dot(normal, away) < 0.0)}
+
+
+def row(vector: Any) -> Any:
+    """Return the coordinates (3,) of a point, a vector or a direction."""
+    return np.array([vector.X(), vector.Y(), vector.Z()])
+
+
+def unit(vector: Any) -> Any:
+    """Return a vector (3,) of length 1; zero stays."""
+    return vector / max(float(np.linalg.norm(vector)), 1e-300)
+
+
 def area(face: Any) -> float:
     """Return the area of a face."""
     found = GProp_GProps()
@@ -361,6 +418,7 @@ def main(
         "what": what,
         "left_out": beside,
         "names": names,
+        "shapes": shapes_of(bodies, float(factor)) if what != "mesh" else [],
         "size": size,
         "states": Counter(states),
         "missing": [number for number, lost_area in areas if lost_area > NO_AREA * size**2],
