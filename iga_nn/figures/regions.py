@@ -74,19 +74,33 @@ def _first_of_faces(regions: Sequence[Region], body: Body, points: Array, normal
 
 
 def draw_regions(path: str | Path | None, surface: Surface, regions: Sequence[Region]) -> Figure:
-    """Draw regions on a surface, from the front and from behind. Where two meet, the first is shown."""
+    """Draw regions on a surface with its sharp edges and axes, from the front and from behind.
+
+    Where two regions meet, the first is shown.
+    """
     palette, (normals, areas) = _palette(len(regions)), normals_and_areas(surface.vertices, surface.faces)
     sides = np.clip(np.sqrt(CELLS * areas / areas.sum()).astype(int), 1, FINEST)
     grids = [_grid(triangle, side) for triangle, side in zip(surface.vertices[surface.faces], sides, strict=True)]
     counts = (sides + 1) ** 2
     points = np.concatenate([grid.reshape(-1, 3) for grid in grids]).T
-    parts = np.split(palette[_first(regions, points, np.repeat(normals, counts, axis=0).T)], np.cumsum(counts)[:-1])
-    outlined = len(sides) <= LINES_UP_TO
+    first = _first(regions, points, np.repeat(normals, counts, axis=0).T)
+    parts = np.split(palette[first], np.cumsum(counts)[:-1])
+    outlined = len(sides) <= LINES_UP_TO and not surface.brep  # triangles of a solid model are its reader's
     patches = [
         Patch(grid, part.reshape(grid.shape), every=int(side) if outlined else 0)
         for grid, part, side in zip(grids, parts, sides, strict=True)
     ]
-    return _draw(path, patches, palette, list(map(str, regions)), "Regions of the surface")
+    if len(surface.features) and not outlined:
+        patches.append(_sharp_edges(surface))
+    names = list(map(str, regions))
+    return _draw(path, patches, palette, names, "Regions of the surface", surface.unit)
+
+
+def _sharp_edges(surface: Surface) -> Patch:
+    """Return the sharp edges as patches without width, of which the lines alone are seen."""
+    ends = surface.vertices[surface.features.edges]
+    points = np.stack([ends, ends], axis=1)  # (e, 2, 2, 3)
+    return Patch(points, np.zeros_like(points), every=1)
 
 
 def _grid(triangle: Array, side: int) -> Array:
@@ -110,9 +124,16 @@ def _palette(count: int) -> Array:
     return np.array([*map(to_rgb, chosen), to_rgb(REST)])
 
 
-def _draw(path: str | Path | None, patches: list[Patch], palette: Array, names: Sequence[str], title: str) -> Figure:
+def _draw(
+    path: str | Path | None,
+    patches: list[Patch],
+    palette: Array,
+    names: Sequence[str],
+    title: str,
+    unit: str | None = None,
+) -> Figure:
     figure, (panels,) = panels_of(1, 2)
-    show_around(panels, patches)
+    show_around(panels, patches, unit=unit)
     labels = [name if len(name) <= LONGEST else f"{name[: LONGEST - 1]}…" for name in names]
     swatches = [
         Swatch(color=color, label=label.replace("$", r"\$")) for color, label in zip(palette, labels, strict=False)

@@ -26,6 +26,7 @@ LINE_WIDTH = 1.6  # pixels
 NEARER_LINES, NEARER_MARKS = 0.003, 0.01  # of the scene's size, towards the viewer: keeps them before a surface
 NAMELESS: Mapping[str, Array] = MappingProxyType({})
 LETTERS = 15  # pixels
+ROOM = 1.3  # of the picture's scale, for axes and their numbers
 REMEDY = "apt-get install --no-install-recommends libegl1 libgl1-mesa-dri"
 CANNOT_DRAW = f"VTK cannot draw on this machine; remedy: {REMEDY}"
 
@@ -114,10 +115,12 @@ def draw(
     pixels: tuple[int, int],
     marks: Array | None = None,
     names: Mapping[str, Array] = NAMELESS,
+    unit: str | None = None,
 ) -> NDArray[np.uint8]:
     """Return a picture (height, width, 3) of the patches in parallel projection that fills `pixels` = (width, height).
 
     marks: points (k, 3), drawn as black balls. names: texts that are written at points (3,), where these are seen.
+    unit: of the axes that are drawn around the patches, "" for none; without it there are no axes.
     """
     import pyvista
 
@@ -139,7 +142,7 @@ def draw(
     _add_lines(plotter, patches, NEARER_LINES * nearer)
     if marks is not None:
         plotter.add_points(marks + NEARER_MARKS * nearer, color="black", point_size=32, render_points_as_spheres=True)
-    _aim(plotter, cloud, view, pixels)
+    _aim(plotter, cloud if unit is None else _corners(cloud), view, pixels)
     if names:
         plotter.add_point_labels(
             np.stack(list(names.values())) + NEARER_MARKS * nearer,
@@ -150,6 +153,8 @@ def draw(
             shape_opacity=0.7,
             margin=1,
         )
+    if unit is not None:
+        _add_axes(plotter, cloud, unit)
     plotter.add_light(pyvista.Light(light_type="headlight", intensity=0.9))
     image: NDArray[np.uint8] = plotter.screenshot(return_img=True)
     plotter.close()
@@ -195,6 +200,21 @@ def _cells(rows: Array, start: int) -> NDArray[np.int64]:
     """Return lines (k, m, 3) as VTK lists cells: the number of points before each. start: the first point's number."""
     numbers = start + np.arange(rows.size // 3).reshape(rows.shape[:2])
     return np.insert(numbers, 0, rows.shape[1], axis=1).ravel()
+
+
+def _corners(points: Array) -> Array:
+    """Return the corners (8, 3) of the box of points."""
+    rows = np.stack([points.min(axis=0), points.max(axis=0)])
+    return np.stack(np.meshgrid(*rows.T, indexing="ij"), axis=-1).reshape(-1, 3)
+
+
+def _add_axes(plotter: Any, points: Array, unit: str) -> None:
+    """Draw axes with numbers along the edges of the box of points, and make room for them."""
+    titles = {f"{axis}title": f"{axis} [{unit}]" if unit else axis for axis in "xyz"}
+    bounds = np.stack([points.min(axis=0), points.max(axis=0)], axis=1).ravel()
+    look = {"font_size": LETTERS - 3, "n_xlabels": 3, "n_ylabels": 3, "n_zlabels": 3, "fmt": "%.4g", "color": "black"}
+    plotter.show_bounds(bounds=bounds.tolist(), location="outer", ticks="outside", use_3d_text=False, **titles, **look)
+    plotter.camera.parallel_scale *= ROOM
 
 
 def _aim(plotter: Any, points: Array, view: View, pixels: tuple[int, int]) -> None:

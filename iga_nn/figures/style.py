@@ -60,19 +60,24 @@ def show(
     view: View,
     marks: Array | None = None,
     names: Mapping[str, Array] = NAMELESS,
+    unit: str | None = None,
 ) -> None:
-    """Draw patches on a panel under a title. marks, names: as in `draw`."""
-    panel.imshow(draw(patches, view, PANEL, marks, names))
+    """Draw patches on a panel under a title. marks, names, unit: as in `draw`."""
+    panel.imshow(draw(patches, view, PANEL, marks, names, unit))
     panel.set_title(title, fontsize=13)
 
 
 def show_around(
-    panels: Any, patches: list[Patch], marks: Array | None = None, names: Mapping[str, Array] = NAMELESS
+    panels: Any,
+    patches: list[Patch],
+    marks: Array | None = None,
+    names: Mapping[str, Array] = NAMELESS,
+    unit: str | None = None,
 ) -> None:
-    """Draw the same patches from the front and from behind on two panels. marks, names: as in `draw`."""
+    """Draw the same patches from the front and from behind on two panels. marks, names, unit: as in `draw`."""
     view = view_of(patches)
     for panel, title, direction in zip(panels, ("front", "back"), (view, view.turned()), strict=True):
-        show(panel, title, patches, direction, marks, names)
+        show(panel, title, patches, direction, marks, names, unit)
 
 
 def show_inside(panels: Any, body: BodyLike, points: Samples, painted: Painted) -> None:
