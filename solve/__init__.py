@@ -42,6 +42,8 @@ from .options import SolveOptions as SolveOptions
 from .options import check_device as check_device
 from .quantities import Extremes as Extremes
 from .reactions import Balance as Balance
+from .singular import SingularPlace as SingularPlace
+from .singular import SingularPlaces as SingularPlaces
 from .solution import PatchSolution as PatchSolution
 from .solution import Solution as Solution
 from .solution import SolveReport as SolveReport

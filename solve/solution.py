@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
@@ -19,6 +20,7 @@ from .forms.boundary_value_problem import BoundaryValueProblem
 from .forms.form import Quantity
 from .quantities import Extremes, all_extremes, at_points, extremes, on_grid
 from .reactions import Balance
+from .singular import SingularPlaces, singular_places
 
 if TYPE_CHECKING:
     import pyvista
@@ -225,6 +227,11 @@ class Solution(BodyField, Shown):
             for one, volume, own in parts
         )
         return cls(tuple(patches), body, report, problem)
+
+    @cached_property
+    def singular(self) -> SingularPlaces:
+        """Return the places where the gradient is infinite, as the body's edges and the data say."""
+        return singular_places(self.body, [one.problem for one in self.patches], [one.knots for one in self.patches])
 
     @property
     def only(self) -> PatchSolution:
