@@ -292,7 +292,7 @@ def _zoomed(groups: Sequence[FieldGroup], together: Sequence[Quantity], start: _
         for number in np.unique(found.group).tolist():
             row, column = np.nonzero(found.group == number)
             owners = np.repeat(found.rows[row, column], len(steps))
-            every = _at(groups[number], together[number], owners, around[row, column].reshape(-1, 3))
+            every = at_places(groups[number], together[number], owners, around[row, column].reshape(-1, 3))
             own = every.reshape(len(every), len(row), len(steps))[row, np.arange(len(row))]  # of each row its quantity
             values[row, column] = own
         top = values.argmax(axis=2)[..., None]
@@ -305,7 +305,7 @@ def _zoomed(groups: Sequence[FieldGroup], together: Sequence[Quantity], start: _
     return found
 
 
-def _at(group: FieldGroup, quantity: Quantity, owners: IntArray, where: Array) -> Array:
+def at_places(group: FieldGroup, quantity: Quantity, owners: IntArray, where: Array) -> Array:
     """Return a quantity (..., m) at parameters (m, 3) of patches (m,) of a group."""
     u, slopes = group.values.at(owners, where), group.values.slopes_at(owners, where)
     x, jacobian = group.maps.at(owners, where), group.maps.slopes_at(owners, where)

@@ -134,3 +134,24 @@ def test_a_surface_has_its_part():
 
 def test_an_edge_that_bends_by_just_the_angle_is_crossed():
     assert len(cube().flood(0, 0.0)) == 2 and len(cube().flood(0, 90.0)) == 12 and len(cube().flood(0, 89.9)) == 2
+
+
+def test_offsets_of_a_round_are_zero_between_its_chords_and_the_round():
+    part = of(trimesh.creation.cylinder(radius=2.0, height=3.0, sections=36))  # bends by 10 degrees
+    angles, height = np.linspace(0.01, 6.0, 50), np.linspace(-1.2, 1.2, 50)
+    normals = np.stack([np.cos(angles), np.sin(angles), 0.0 * angles], axis=1)
+    sagitta = 2.0 * (1.0 - np.cos(np.pi / 36))
+    for off in (0.0, 0.01, -0.01, -0.5 * sagitta):
+        points = (2.0 + off) * normals + height[:, None] * [0.0, 0.0, 1.0]
+        found = part.offsets(points, normals)
+        assert np.all(np.abs(found + off) < (0.03 * sagitta if off >= 0.0 else 1.01 * sagitta))
+        assert np.all(found * off <= 0.0)
+    lids = np.array([[0.3, 0.2, 1.49], [0.3, 0.2, -1.52]])
+    assert part.offsets(lids, np.array([[0.0, 0.0, 1.0], [0.0, 0.0, -1.0]])) == pytest.approx([0.01, -0.02])
+
+
+def test_offsets_of_a_box_are_those_of_its_planes_and_edges():
+    part = cube()
+    points = np.array([[0.3, 0.4, 1.1], [0.3, 0.4, 0.9], [1.1, 0.5, 1.1]])
+    normals = np.array([[0.0, 0.0, 1.0], [0.0, 0.0, 1.0], [0.6, 0.0, 0.8]])
+    assert part.offsets(points, normals) == pytest.approx([-0.1, 0.1, -0.14])

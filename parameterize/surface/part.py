@@ -13,6 +13,7 @@ from ..arrays import Array, IntArray
 from ..display import Brief
 from .geometry import connected, directed_edges, normals_and_areas
 from .groups import Groups
+from .nearest import shares_of
 
 NEAR = 1e-6  # of the box's diagonal: triangles whose distances differ by less are equally near
 THIN = 1e-6  # of the box's diagonal: the normal of a lower triangle is rounding
@@ -23,6 +24,9 @@ ROUNDING = 1e-12  # of a cosine: an edge that bends by just the angle is crossed
 # A triangle whose cosine with a point's normal is less than ASIDE belongs to another face of the part, if one that
 # agrees better lies within FAR, a share of the box's diagonal: a round wall is off the flat triangles of a coarse mesh.
 ASIDE, FAR = 0.5, 0.05
+CHORD = (
+    12.0  # degrees between triangles that may be chords of one curved face: readers of CAD make 6, exporters 5 to 10
+)
 _ALIKE = 2.0  # cells of a normal's coordinates in [0, 1]: normals in one cell share a search
 
 
@@ -94,6 +98,47 @@ class PartSurface(Brief):
             own = aside[cells == cell]
             best[own] = self._alignment(where[own], given[own], best[own])
         return best
+
+    def offsets(self, points: Array, normals: Array) -> Array:
+        """Return how far (k,) the surface lies from points (k, 3), along their outward unit normals (k, 3).
+
+        A triangle may be flat, or a chord of a curved surface: it is known no better. So points between it and the
+        surface that bends with the neighbours' normals have the offset zero, others that to the nearer one.
+        """
+        chosen = self.nearest(points, normals)
+        corners = self.vertices[self.faces[chosen]]  # (k, 3, 3)
+        feet = nearest_in_triangles(np.ascontiguousarray(points), self.vertices, self.faces[chosen])
+        flat = np.sum((feet - points) * normals, axis=1)
+        above = np.einsum("kca,kca->kc", corners - feet[:, None], self._bent[chosen])  # of the corners' tangent planes
+        lift = 0.5 * np.einsum("kc,kca->ka", shares_of(feet, corners) * above, self._bent[chosen])
+        bent = flat + np.sum(lift * normals, axis=1)
+        return np.where(flat * bent > 0.0, np.where(np.abs(flat) < np.abs(bent), flat, bent), 0.0)
+
+    @cached_property
+    def _bent(self) -> Array:
+        """Return unit normals (m, 3, 3) at the corners of triangles: means over those there that bend by CHORD at most.
+
+        The weights are their angles at the corner.
+        """
+        corners = self.vertices[self.faces]
+        ahead, back = np.roll(corners, -1, axis=1) - corners, np.roll(corners, 1, axis=1) - corners
+        size = np.linalg.norm(np.cross(ahead, back), axis=2)
+        angles = np.arctan2(size, np.sum(ahead * back, axis=2))  # (m, 3)
+        starts, around = self._around
+        corner_of = np.argsort(self.faces.ravel(), kind="stable") % 3
+        vertices = self.faces.ravel()
+        counts = np.diff(starts)[vertices]
+        own = np.repeat(np.arange(len(vertices)), counts)  # pairs of a corner and a triangle there
+        place = (
+            np.repeat(starts[vertices], counts) + np.arange(len(own)) - np.repeat(np.cumsum(counts) - counts, counts)
+        )
+        other = around[place]
+        near = np.sum(self.normals[own // 3] * self.normals[other], axis=1) >= np.cos(np.radians(CHORD))
+        weights = np.where(near, angles[other, corner_of[place]], 0.0)
+        sums = [np.bincount(own, weights * self.normals[other, a], len(vertices)) for a in range(3)]
+        total = np.stack(sums, axis=1).astype(np.float64)
+        total = total / np.maximum(np.linalg.norm(total, axis=1, keepdims=True), np.finfo(np.float64).tiny)
+        return total.reshape(-1, 3, 3)
 
     def _first(self, point: Array, reach: float, found: int) -> int:
         """Return the lowest number of the triangles at the corners of one that lie within `reach` of a point (3,)."""
@@ -192,6 +237,28 @@ def _best_aligned(
                 if other > agreement + AGREES and _distance(points[i], vertices, faces[t]) <= reach[i]:
                     best[i], agreement = t, other
     return best
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def nearest_in_triangles(points: Array, vertices: Array, faces: IntArray) -> Array:
+    """Return the point (k, 3) of each triangle that is nearest to each point (k, 3): in its inside, or on a side."""
+    found = np.empty_like(points)
+    for i in range(len(points)):
+        corners = vertices[faces[i]]
+        normal = np.cross(corners[1] - corners[0], corners[2] - corners[0])
+        size, inside, least = np.dot(normal, normal), True, np.inf
+        for k in range(3):
+            start, along = corners[k], corners[(k + 1) % 3] - corners[k]
+            away = points[i] - start
+            inside = inside and np.dot(np.cross(along, away), normal) >= 0.0
+            share = min(max(np.dot(away, along) / max(np.dot(along, along), 1e-300), 0.0), 1.0)
+            foot = start + share * along
+            squared = np.dot(points[i] - foot, points[i] - foot)
+            if squared < least:
+                found[i], least = foot, squared
+        if inside and size > 0.0:
+            found[i] = points[i] - (np.dot(points[i] - corners[0], normal) / size) * normal
+    return found
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]

@@ -103,7 +103,7 @@ def _weak_face(patches: Sequence[Stated], faces: Faces, name: str, strong: Value
     problem, space = patches[0].problem, patches[0].space
     regions = [condition.region for condition in problem.conditions]
     length = next((one.frame.length for one in regions if one.frame is not None), None)
-    coder = _coder(problem, faces, [patch.problem.prefix + name for patch in patches], strong)
+    coder = codes_on(problem, faces.nets, [patch.problem.prefix + name for patch in patches], strong)
     rule = surface_rules(faces, space, coder, length, any(one.needs_normal for one in regions))
     if rule is None:
         return None
@@ -187,15 +187,15 @@ def _unheld(moved: Array, held: Array) -> Array | None:
     return np.asarray(scaled @ turned[:, 0]) if shares[0] <= SLIDES else None
 
 
-def _coder(problem: BoundaryValueProblem, faces: Faces, names: Sequence[str], strong: Value | None) -> Codes:
+def codes_on(problem: BoundaryValueProblem, nets: Array, names: Sequence[str], strong: Value | None = None) -> Codes:
     """Return the function from points to codes: bit i where condition i holds, bit 0 for the exact flux.
 
-    names: (k,), of the faces in the body. strong: the condition that the trial space holds on the faces, if any; codes
-    are zero where it is alone.
+    nets: (k, n, 3), the control points of the faces. names: (k,), of the faces in the body. strong: the condition that
+    the trial space holds on the faces, if any; codes are zero where it is alone.
     """
     rest = int(bool(problem.exact_formulas) and strong is None)
     alone = sum(1 << i for i, condition in enumerate(problem.conditions, 1) if condition is strong)
-    near = tolerances(faces.nets)
+    near = tolerances(nets)
 
     def codes(x: Array, normal: Array, owners: IntArray) -> IntArray:
         found, on = np.full(x.shape[1:], rest, dtype=np.int64), FacesOfPoints(names, owners, near[owners])
@@ -208,13 +208,13 @@ def _coder(problem: BoundaryValueProblem, faces: Faces, names: Sequence[str], st
 
 def renewed(face: WeakFace, problem: BoundaryValueProblem) -> WeakFace:
     """Return a face with the loads and values of another problem, whose conditions act on the same regions."""
-    acting = _Acting(problem, face.x, face.normal, face.weights, face.codes)
+    acting = Acting(problem, face.x, face.normal, face.weights, face.codes)
     projector, values = acting.held()
     return replace(face, values=values, loads=acting.natural(projector)[0])
 
 
 @dataclass(frozen=True, eq=False)
-class _Acting:
+class Acting:
     """Evaluate the conditions that act at m points of a face; attributes as in WeakFace."""
 
     problem: BoundaryValueProblem
@@ -223,7 +223,8 @@ class _Acting:
     weights: Array
     codes: IntArray
 
-    def _holding(self, condition: int) -> Any:
+    def holding(self, condition: int) -> Any:
+        """Return the mask (m,) of the points where the condition with this number holds."""
         return self.codes >> (condition + 1) & 1 == 1
 
     def held(self) -> tuple[Array, Array]:
@@ -231,7 +232,7 @@ class _Acting:
         c, m = self.problem.form.components, len(self.weights)
         projector, given = np.zeros((c, c, m)), np.zeros((c, m))
         for i, condition in enumerate(self.problem.conditions):
-            here = np.flatnonzero(self._holding(i))
+            here = np.flatnonzero(self.holding(i))
             if not isinstance(condition, Value) or not len(here):
                 continue
             points = part_of(self.x, here)
@@ -251,7 +252,7 @@ class _Acting:
 
     def _refuse_contradiction(self, condition: int, point: int) -> None:
         conditions = self.problem.conditions
-        others = [c.role for i, c in enumerate(conditions[:condition]) if self._holding(i)[point] and c.is_essential]
+        others = [c.role for i, c in enumerate(conditions[:condition]) if self.holding(i)[point] and c.is_essential]
         raise ValueError(
             f"{conditions[condition].role} and {others[-1]} overlap and contradict each other at {self._place(point)}"
         )
@@ -271,7 +272,7 @@ class _Acting:
         loads, factor = np.zeros((self.problem.form.components, len(self.weights))), np.zeros(len(self.weights))
         named = np.zeros(len(factor), dtype=bool)
         for i, condition in enumerate(self.problem.conditions):
-            here = np.flatnonzero(self._holding(i))
+            here = np.flatnonzero(self.holding(i))
             named[here] = True
             if condition.is_essential or not len(here):
                 continue
@@ -295,12 +296,12 @@ class _Acting:
         """Return the mask of points with the exact solution's flux in the components that a value leaves free."""
         natural = np.zeros(len(named), dtype=bool)
         for i, condition in enumerate(self.problem.conditions):
-            natural |= self._holding(i) & (not condition.is_essential)
+            natural |= self.holding(i) & (not condition.is_essential)
         trace = np.einsum("ccm->m", projector)
         return (trace > 0.5) & (trace < self.problem.form.components - 0.5) & ~natural
 
     def _refuse_load(self, condition: Condition, point: int) -> None:
-        held = [c for i, c in enumerate(self.problem.conditions) if c.is_essential and self._holding(i)[point]]
+        held = [c for i, c in enumerate(self.problem.conditions) if c.is_essential and self.holding(i)[point]]
         is_same = condition.region == held[0].region
         remedy = "give one of them" if is_same else f"write '{condition.region} and not ({held[0].region})'"
         raise ValueError(
@@ -317,10 +318,10 @@ class _Builder:
     rule: SurfaceRule
 
     @property
-    def _acting(self) -> _Acting:
+    def _acting(self) -> Acting:
         at = self.rule.at
         x = Points.at(np.ascontiguousarray(at.x), at.parameters)
-        return _Acting(self.problem, x, at.normal, self.rule.weights, self.rule.codes)
+        return Acting(self.problem, x, at.normal, self.rule.weights, self.rule.codes)
 
     def demand_consistent(self) -> None:
         """Raise ValueError where values contradict each other, or a load acts on a held part."""
