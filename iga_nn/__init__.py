@@ -19,6 +19,7 @@ from .version import __version__
 os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
 
 _HOME = {  # module, and the name there where it is another one; type checkers read __init__.pyi
+    "Ask": "solve",
     "BSplineVolume": "parameterize.spline.volume",
     "Body": "parameterize.spline.body",
     "Elasticity": "solve",

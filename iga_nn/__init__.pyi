@@ -8,6 +8,7 @@ from parameterize.spline.volume import BSplineVolume as BSplineVolume
 from parameterize.surface.surface import MeshError as MeshError
 from parameterize.surface.surface import Surface as Surface
 from parameterize.surface.surface import load_surface as load_surface
+from solve import Ask as Ask
 from solve import Elasticity as Elasticity
 from solve import Form as Form
 from solve import March as March

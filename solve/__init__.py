@@ -21,6 +21,8 @@ from typing import Any
 
 from parameterize.old_names import renamed
 
+from .answer import Answer as Answer
+from .ask import Ask as Ask
 from .diagnostics import ConvergenceError as ConvergenceError
 from .field import BodyField as BodyField
 from .field import SplineField as SplineField

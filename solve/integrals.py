@@ -15,15 +15,15 @@ from parameterize.spline.volume import FACE_NAMES, BSplineVolume
 
 from .discretization.space import TrialSpace, same_smoothness
 from .discretization.surface_rule import Faces, SurfaceRule, surface_rules
-from .field import Points
+from .field import Points, SplineField
 from .forms.form import Quantity
 from .forms.frame import UnitFrame
 from .forms.region import FacesOfPoints, Region, Regions, regions_of, tolerances
-from .quantities import at_points, grid_values, quantity_of, slabs
+from .quantities import at_points, grid_values, quantity_of, slabs, volume_of
 from .solution import PatchSolution, Solution
 
 Integrand = Quantity | Callable[[Points], ArrayLike]
-Patch = BSplineVolume | PatchSolution
+Patch = BSplineVolume | SplineField  # a field with its volume
 Domain = BodyLike | PatchSolution | Solution
 
 
@@ -124,7 +124,7 @@ def _maps(body: Domain) -> Body:
 
 
 def _volume_of(body: Patch) -> BSplineVolume:
-    return body if isinstance(body, BSplineVolume) else body.geometry
+    return body if isinstance(body, BSplineVolume) else volume_of(body)
 
 
 def _counts(body: Patch) -> list[int]:
@@ -154,13 +154,24 @@ def _surface_rules(body: Domain, over: Regions) -> Iterator[tuple[Patch, Surface
 
     Each rule comes with its patch. Raises ValueError where that part is empty.
     """
-    regions, glued, found = _placed(body, over), _maps(body), False
-    length = None if glued.is_single else UnitFrame.of(glued).length
-    needs_normal = any(region.needs_normal for region in regions)
     patches = _patches(body)
-    for faces, space in _outer_faces(patches, glued):
+    for number, rule in surface_rules_on(patches, _maps(body), _placed(body, over)):
+        yield patches[number], rule
+
+
+def surface_rules_on(
+    patches: Sequence[Patch], body: Body, regions: Sequence[Region]
+) -> Iterator[tuple[int, SurfaceRule]]:
+    """Yield the rules of the part of the boundary in regions that are placed, each with the number of its patch.
+
+    patches: of the body, or fields on these. Raises ValueError where that part is empty.
+    """
+    found = False
+    length = None if body.is_single else UnitFrame.of(body).length
+    needs_normal = any(region.needs_normal for region in regions)
+    for faces, space in _outer_faces(patches, body):
         name = FACE_NAMES[2 * faces.axis + faces.side]
-        names, near = [glued.face_name(i, name) for i in faces.group.numbers.tolist()], tolerances(faces.nets)
+        names, near = [body.face_name(i, name) for i in faces.group.numbers.tolist()], tolerances(faces.nets)
 
         def codes(x: Array, normal: Array, owners: IntArray, names: Any = names, near: Any = near) -> IntArray:
             on = FacesOfPoints(names, owners, near[owners])
@@ -171,7 +182,7 @@ def _surface_rules(body: Domain, over: Regions) -> Iterator[tuple[Patch, Surface
             continue
         found = True
         for owner in np.unique(rule.at.owners):
-            yield patches[faces.group.numbers[owner]], rule.part(np.flatnonzero(rule.at.owners == owner))
+            yield int(faces.group.numbers[owner]), rule.part(np.flatnonzero(rule.at.owners == owner))
     if not found:
         raise ValueError(
             f"over {', '.join(repr(str(region)) for region in regions)}: no part of the boundary lies there"

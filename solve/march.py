@@ -31,7 +31,7 @@ from .forms.owners import Owner, demand_owners, demand_positive, of_each_patch
 from .linear.krylov import generalized_residuals
 from .options import SolveOptions
 from .patch_system import PatchProblem
-from .solver import prepared
+from .preparation import prepared
 from .system import System, coefficients_in, field_of, system_of
 
 SCHEMES = ("bdf2", "trapezoidal")

@@ -24,8 +24,8 @@ from .linear.direct import factorized, price_of, sparse
 from .linear.inverse import RoughInverse
 from .lowest import Lowest, Pencil, Product, by_columns, of_unit_mass
 from .options import SolveOptions
+from .preparation import discretized
 from .rigid import rigid_motions
-from .solver import discretized
 from .system import System
 
 DOUBTFUL = 1e-3  # share of an eigenvalue from which on an error of it is told

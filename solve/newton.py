@@ -33,8 +33,8 @@ from .linear.low_order import entries_of, on_trilinear, survey_of, surveyed
 from .linear.nodal import NodalBasis
 from .options import SolveOptions
 from .patch_system import PatchProblem
+from .preparation import prepared
 from .solution import Solution, SolveReport
-from .solver import prepared
 from .system import coefficients_in, demand_fixed, field_of, glued, is_diagonalized, preconditioner
 
 ENOUGH = 0.8  # share of the forces along a step that may be left at its end

@@ -8,6 +8,7 @@ from typing import Any, Self
 
 from parameterize.threads import default_threads
 
+from .ask import Ask, asks_of
 from .field import FieldOnBody
 from .forms.boundary_value_problem import BoundaryValueProblem
 
@@ -49,7 +50,7 @@ class IterationOptions:
 class SolveOptions(IterationOptions):
     """Hold all options of a solve, of its discretization too: keywords of `iga_nn.solve`, which describes them.
 
-    Raises ValueError also where the number of threads is out of range.
+    Raises ValueError also where the number of threads is out of range, ExpressionError for an ask that is refused.
     """
 
     refine: int = 0
@@ -58,9 +59,11 @@ class SolveOptions(IterationOptions):
     quadrature: str = "spline"
     comm: Any = None
     formulation: str | None = None
+    ask: tuple[Ask, ...] = ()
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        object.__setattr__(self, "ask", asks_of(self.ask))
         if self.formulation not in (None, *FORMULATIONS):
             raise ValueError(f"formulation must be one of {', '.join(FORMULATIONS)}, got {self.formulation!r:.80}")
         if self.threads is not None and self.threads < 1:

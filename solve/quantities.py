@@ -6,14 +6,14 @@ slowly than the spline: a stress is less accurate than the displacement.
 """
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from parameterize.arrays import Array, IntArray, in_brackets
+from parameterize.arrays import Array, IntArray, Mask, in_brackets
 from parameterize.spline.bspline import breakpoints, divided_spans, evaluate_at, real_array
 from parameterize.spline.volume import UNITS, BSplineVolume
 
@@ -22,6 +22,7 @@ from .field_groups import FieldGroup, groups_of
 from .forms.form import Form, Quantity
 
 Place = tuple[float, float, float]
+Inside = Callable[[Any], Mask]  # whether an extreme may lie at points (3, ...)
 _PER_SPAN = 3  # intervals a span and direction in which extremes are looked for
 _SAMPLES = 2**16  # of a search for all extremes, where one a span is not more
 _CANDIDATES = 8  # samples around which they are refined
@@ -168,7 +169,7 @@ def _of_shape(found: Array, shape: tuple[int, ...]) -> Array:
 def extremes(solution: FieldOnBody, what: str | Quantity) -> Extremes:
     """Return the least and the largest value of a quantity of one number a point, and their places."""
     groups = groups_of(solution)
-    (found,) = _extremes_of(groups, [[quantity_of(_form_of(group), what)] for group in groups], _PER_SPAN)
+    (found,) = extremes_of(groups, [[quantity_of(_form_of(group), what)] for group in groups], _PER_SPAN)
     return found
 
 
@@ -178,11 +179,16 @@ def all_extremes(solution: FieldOnBody) -> dict[str, Extremes]:
     The search uses fewer samples a span than `extremes`, so that it takes a small part of the time of a solve.
     """
     groups = groups_of(solution)
-    spans = sum(len(group) * math.prod(len(breakpoints(knots)) - 1 for knots in group.values.knots) for group in groups)
-    per_span = max(1, min(_PER_SPAN, int((_SAMPLES / spans) ** (1.0 / 3.0))))
+    per_span = samples_per_span(groups, _SAMPLES)
     names = _form_of(groups[0]).reported
     quantities = [[quantity_of(_form_of(group), name) for name in names] for group in groups]
-    return dict(zip(names, _extremes_of(groups, quantities, per_span), strict=True))
+    return dict(zip(names, extremes_of(groups, quantities, per_span), strict=True))
+
+
+def samples_per_span(groups: Sequence[FieldGroup], most: int) -> int:
+    """Return how many intervals a span and direction a search takes that has no more samples than `most`, if it can."""
+    spans = sum(len(group) * math.prod(len(breakpoints(knots)) - 1 for knots in group.values.knots) for group in groups)
+    return max(1, min(_PER_SPAN, int((most / spans) ** (1.0 / 3.0))))
 
 
 def _form_of(group: FieldGroup) -> Form:
@@ -218,32 +224,39 @@ class _Candidates:
         return _Candidates(*(getattr(self, field.name)[each, columns] for field in fields(self)))
 
 
-def _extremes_of(
-    groups: Sequence[FieldGroup], quantities: Sequence[Sequence[Quantity]], per_span: int
+def extremes_of(
+    groups: Sequence[FieldGroup],
+    quantities: Sequence[Sequence[Quantity]],
+    per_span: int,
+    inside: Inside | None = None,
 ) -> list[Extremes]:
     """Return the extremes of q quantities, refined from the best samples.
 
-    quantities: those of each group. The arrays inside have 2 q rows: first the negative quantities, whose largest
+    quantities: those of each group. inside: where they may lie, anywhere by default. Raises ValueError where no sample
+    lies there. The arrays inside have 2 q rows: first the negative quantities, whose largest
     values give the least values, then the quantities.
     """
-    together = [_together(own) for own in quantities]
+    together = [_together(own, inside) for own in quantities]
     parts = [
         part for number, group in enumerate(groups) for part in _sampled(group, number, together[number], per_span)
     ]
     found = _zoomed(groups, together, _Candidates.joined(parts))
     best = found.chosen(found.values.argmax(axis=1)[:, None])
+    if np.isneginf(best.values).any():
+        raise ValueError("no sample of the body lies there")
     count = len(best.values) // 2
     peaks = [_peak(groups, best, row) for row in range(2 * count)]
     pairs = zip(peaks[:count], peaks[count:], strict=True)
     return [Extremes(-least[0], least[1], least[2], *largest) for least, largest in pairs]
 
 
-def _together(quantities: Sequence[Quantity]) -> Quantity:
-    """Return the quantity (2 q, ...) of q quantities with both signs."""
+def _together(quantities: Sequence[Quantity], inside: Inside | None) -> Quantity:
+    """Return the quantity (2 q, ...) of q quantities with both signs, minus infinity where extremes may not lie."""
 
     def values(u: Array, grad: Array, x: Array) -> Array:
         found = np.stack([_one_number(quantity(u, grad, x), x.shape[1:]) for quantity in quantities])
-        return np.concatenate([-found, found])
+        both = np.concatenate([-found, found])
+        return both if inside is None else np.where(inside(x), both, -np.inf)
 
     return values
 

@@ -14,6 +14,7 @@ from parameterize.display import Shown, above
 from parameterize.spline.body import Body
 from parameterize.spline.volume import BSplineVolume
 
+from .answer import Answer
 from .discretization.error_norms import Errors
 from .field import BodyField, SplineField
 from .forms.boundary_value_problem import BoundaryValueProblem
@@ -79,6 +80,8 @@ class SolveReport:
         The loads on the body and the reactions of its supports.
     formulation : str
         "mixed" for displacement and pressure of a nearly incompressible body, otherwise "displacement".
+    asked : tuple of Answer
+        The asked quantities, in the order of the asks.
 
     Examples
     --------
@@ -105,6 +108,7 @@ class SolveReport:
     balance: Balance | None = None
     formulation: str = "displacement"
     memory: tuple[float, ...] = ()
+    asked: tuple[Answer, ...] = ()
 
     l2 = _known("errors", "l2")
     l2_relative = _known("errors", "l2_relative")
@@ -116,7 +120,8 @@ class SolveReport:
     def as_dict(self) -> dict[str, Any]:
         """Return the entry of report.json; unknown errors are absent."""
         names = ("elements", "dofs", "h", *NORMS, "iterations", "converged", "residual", "meaningful", "seconds")
-        found = {name: value for name in names if (value := getattr(self, name)) is not None}
+        found: dict[str, Any] = {"asked": [answer.as_dict() for answer in self.asked]} if self.asked else {}
+        found |= {name: value for name in names if (value := getattr(self, name)) is not None}
         found |= self.balance.as_dict() if self.balance and self.balance.is_told else {}
         found |= {} if self.formulation == "displacement" else {"formulation": self.formulation}
         found |= {"traffic": dict(self.traffic)} if self.traffic else {}
@@ -128,7 +133,8 @@ class SolveReport:
         parts += [f"{shown} {value:.4e}" for shown, value in found.items() if value is not None]
         state = "" if self.converged else f", NOT CONVERGED (residual {self.residual:.1e})"
         answers = [str(self.balance)] if self.balance and self.balance.reactions and self.balance.is_told else []
-        return "\n".join([", ".join([*parts, f"{self.iterations} iterations{state}"]), *answers, *self.notices])
+        level = ", ".join([*parts, f"{self.iterations} iterations{state}"])
+        return "\n".join([*map(str, self.asked), level, *answers, *self.notices])
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -237,6 +243,11 @@ class Solution(BodyField, Shown):
     def only(self) -> PatchSolution:
         """Return the solution on the patch of a body of one. Raises ValueError for several."""
         return cast(PatchSolution, super().only)
+
+    @property
+    def answers(self) -> tuple[Answer, ...]:
+        """Return the answers to the asks of the solve, in their order."""
+        return self.report.asked
 
     @property
     def field(self) -> BodyField:

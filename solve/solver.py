@@ -1,33 +1,24 @@
-"""Solves any problem: checks it, discretizes it, and solves the linear system."""
+"""Solves any problem: a solve, the system for a loop of one's own, and the check of a problem's data before them."""
 
-import functools
 from dataclasses import replace
 from typing import Any
 
-import numpy as np
-
-from parameterize.arrays import listed
-from parameterize.compilation import compilation_told
 from parameterize.old_names import takes_volume
-from parameterize.spline.body import Body, BodyLike, as_body
-from parameterize.spline.bspline import greville, open_uniform_knots
-from parameterize.spline.volume import BSplineVolume
+from parameterize.spline.body import BodyLike, as_body
 
+from .asked.functional import functional
 from .assembly import assemble_body_data, balanced
 from .discretization.on_regions import demand_area, demand_supports
 from .discretization.parted import shared_unknowns
 from .discretization.quadrature import gauss_rule, map_planes
-from .discretization.slab import shared_space
-from .discretization.space import TrialSpace, trial_space
 from .forms.boundary_value_problem import BoundaryValueProblem
 from .forms.elasticity import Elasticity
 from .forms.poisson import Poisson
 from .forms.problem import Problem
-from .mixed import build_mixed, is_mixed
 from .options import SolveOptions, check_device
-from .patch_system import PatchProblem
+from .preparation import discretized, on_patches
 from .solution import Solution
-from .system import System, build
+from .system import System
 
 
 @takes_volume
@@ -73,6 +64,9 @@ def solve_problem(body: BodyLike, problem: Poisson | Elasticity | Problem, **how
         which saves a third of the iterations on maps that need many.
     estimate : bool, optional
         Whether to estimate the error from the residual; by default where the problem has no exact solution.
+    ask : Ask or str, or a list of these
+        Quantities to answer, each with an interval, such as "ux at (10, 0, 0)", "von_mises max over z > 20", "mean T
+        over nz > 0.9", "reaction z of u0", "flow over u1" and "energy": `solution.answers`.
     strict : bool
         Whether a failure of the linear solver raises ConvergenceError; otherwise `report.converged` is False. A failure
         before the first iteration leaves no solution, and always raises ConvergenceError.
@@ -85,7 +79,8 @@ def solve_problem(body: BodyLike, problem: Poisson | Elasticity | Problem, **how
     Raises
     ------
     ValueError
-        For arguments out of range and for Neumann data that do not balance the source.
+        For arguments out of range, for Neumann data that do not balance the source, and for an ask that is not one of
+        the problem and the body.
     ExpressionError
         Where the data are not finite or have the wrong sign.
     TypeError
@@ -107,7 +102,12 @@ def solve_problem(body: BodyLike, problem: Poisson | Elasticity | Problem, **how
 def solve_with(body: BodyLike, problem: BoundaryValueProblem, options: SolveOptions) -> Solution:
     """Return the solution of `solve_problem` for options in one object."""
     check_device(options.device, problem)
-    return discretized(body, problem, options).solve_with(options)
+    functionals = [functional(ask, problem, body) for ask in options.ask]
+    solution = discretized(body, problem, options).solve_with(options)
+    if not functionals:
+        return solution
+    found = tuple(one.answer(solution) for one in functionals)
+    return replace(solution, report=replace(solution.report, asked=found))
 
 
 @takes_volume
@@ -147,58 +147,6 @@ def discretize(
     return discretized(body, problem, options)
 
 
-def discretized(body: BodyLike, problem: BoundaryValueProblem, options: SolveOptions, is_loose: bool = False) -> System:
-    """Return the system of `discretize`; that of a loose body, for its modes, needs no supports."""
-    glued = as_body(body)
-    placed, patches = prepared(glued, problem, options)
-    if not is_loose:
-        problem.demand_held()
-        if is_mixed(problem, patches, options):
-            return build_mixed(glued, placed, patches, options)
-    return build(glued, placed, patches, options, is_loose=is_loose)
-
-
-def prepared(
-    body: Body, problem: BoundaryValueProblem, options: SolveOptions
-) -> tuple[BoundaryValueProblem, list[PatchProblem]]:
-    """Check body and problem; return the problem placed in the body, and the problem on each patch."""
-    placed, patches = _on_patches(body, problem, options)
-    if all(any(part.stop <= part.start for part in patch.space.free) for patch in patches):
-        raise ValueError(
-            f"degree {patches[0].space.degrees} leaves no unknown inside the volume: raise refine or degree"
-        )
-    for of_map in {patch.volume.degrees for patch in patches}:
-        _warm_up(of_map, options.degree, placed.form.components == 1 and placed.form.symmetric)
-    return placed, patches
-
-
-def _on_patches(
-    body: Body, problem: BoundaryValueProblem, options: SolveOptions
-) -> tuple[BoundaryValueProblem, list[PatchProblem]]:
-    """Return the problem placed in the body, and the problem on each patch."""
-    if not isinstance(problem, BoundaryValueProblem):
-        raise TypeError(f"problem must be a Poisson, an Elasticity or a Problem, got {type(problem).__name__}")
-    _demand_known_faces(body, problem)
-    placed, spaces = problem.on(body), dict[Any, TrialSpace]()
-    patches = []
-    for volume, own, outer in zip(body, placed.on_patches(body), body.outer, strict=True):
-        key = volume.degrees, *(row.tobytes() for row in volume.knots), own.dirichlet, outer
-        if key not in spaces:
-            spaces[key] = trial_space(volume, options.refine, options.degree, own.dirichlet, outer)
-        patches.append(PatchProblem(volume, own, spaces[key]))
-    if body.is_single:
-        patches = [replace(patches[0], space=shared_space(patches[0].space, options.comm))]
-    return placed, patches
-
-
-def _demand_known_faces(body: Body, problem: BoundaryValueProblem) -> None:
-    """Raise ValueError for data of faces that are not outer faces of the body."""
-    outer = {body.face_name(*face) for face in body.outer_faces}
-    if unknown := sorted(problem.patch_faces - outer):
-        faces = "u0 to w1" if body.is_single else listed(sorted(outer), 12)
-        raise ValueError(f"{unknown[0]} is no outer face of the body; its faces are {faces}")
-
-
 def check_problem(body: BodyLike, problem: BoundaryValueProblem, comm: Any = None) -> None:
     """Evaluate a problem's data at the points of the coarsest solve; finer levels use points between these.
 
@@ -208,7 +156,7 @@ def check_problem(body: BodyLike, problem: BoundaryValueProblem, comm: Any = Non
     problem.demand_held()
     options = SolveOptions(threads=1, quadrature="gauss", comm=comm)
     glued = as_body(body)
-    _, patches = _on_patches(glued, problem, options)
+    _, patches = on_patches(glued, problem, options)
     unknowns = shared_unknowns(glued, [patch.space for patch in patches], comm)
     own = [patches[number] for number in unknowns.patches]
     with unknowns.agreed():
@@ -225,18 +173,3 @@ def check_problem(body: BodyLike, problem: BoundaryValueProblem, comm: Any = Non
                 with patch.space.agreed():
                     for _, _, x in map_planes(patch.volume, gauss_rule(patch.space)):
                         patch.problem.exact_at(x)
-
-
-@functools.cache
-def _warm_up(degrees: tuple[int, int, int], degree: int | None, is_scalar: bool) -> None:
-    """Compile the kernels, or load them from the cache, so that the seconds of no level include the compilation."""
-    # A large block freed teaches glibc (mallopt(3), M_MMAP_THRESHOLD) to keep freed memory. Else every temporary of a
-    # plane goes back to the system and is faulted in again: formulas take five times as long.
-    np.empty(2**21)
-    knots = [open_uniform_knots(p + 1, p) for p in degrees]
-    rows = [greville(row, p) for row, p in zip(knots, degrees, strict=True)]
-    cube = as_body(BSplineVolume(degrees, tuple(knots), np.stack(np.meshgrid(*rows, indexing="ij"), axis=-1)))  # type: ignore[arg-type]
-    problem = Poisson(exact="sin(x)") if is_scalar else Elasticity(exact=("sin(x)", "y", "z"))
-    with compilation_told():
-        options = SolveOptions(refine=1, degree=degree, threads=1)
-        build(cube, *_on_patches(cube, problem, options), options).solve()

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import iga_nn
-import solve.solver
+import solve.preparation
 from parameterize import compilation, kernel_cache
 from solve.study import benchmark_volume
 
@@ -76,6 +76,6 @@ def test_a_solve_with_kernels_on_disk_tells_nothing(told):
     volume, problem = benchmark_volume(2), iga_nn.Poisson(exact="x")
     iga_nn.solve(volume, problem)
     told()
-    solve.solver._warm_up.cache_clear()
+    solve.preparation._warm_up.cache_clear()
     iga_nn.solve(volume, problem)
     assert told() == []

@@ -9,7 +9,7 @@ import iga_nn
 from parameterize.spline.bspline import with_full_knots
 from solve.assembly import assemble_body_data
 from solve.options import SolveOptions
-from solve.solver import prepared
+from solve.preparation import prepared
 
 NOTHING = ("0", "0", "0")
 FREE = ("u1", "v0", "v1", "w0", "w1")

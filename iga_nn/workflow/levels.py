@@ -8,7 +8,7 @@ from typing import Any
 
 from parameterize.checkpoint import Checkpoints
 from parameterize.spline.body import BodyLike, as_body
-from solve import SolveReport
+from solve import Answer, SolveReport
 from solve.discretization.error_norms import Errors
 from solve.field import BodyField
 from solve.forms.boundary_value_problem import BoundaryValueProblem
@@ -110,6 +110,7 @@ def _report(values: dict[str, Any]) -> SolveReport:
     if balance := values["balance"]:
         reactions = {name: tuple(row) for name, row in balance["reactions"].items()}
         given["balance"] = Balance(**balance | {"load": tuple(balance["load"]), "reactions": reactions})
+    given["asked"] = tuple(Answer(**entry | {"at": entry["at"] and tuple(entry["at"])}) for entry in values["asked"])
     return SolveReport(**given)
 
 
