@@ -7,7 +7,7 @@ where no values are given, and a change r of the residual changes J by r(z_h) (B
 
 import math
 from collections import defaultdict
-from collections.abc import Hashable
+from collections.abc import Hashable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -44,11 +44,19 @@ def adjoint(system: System, samples: Samples, tolerance: float = TOLERANCE) -> B
     return adjoint_of(system, right_of(system, samples), tolerance)
 
 
-def adjoint_of(system: System, right: Array, tolerance: float = TOLERANCE) -> BodyField:
-    """Return the adjoint of a functional whose values at the free functions are a vector (N,)."""
+def adjoint_of(
+    system: System, right: Array, tolerance: float = TOLERANCE, known: Sequence[Array] | None = None
+) -> BodyField:
+    """Return the adjoint of a functional whose values at the free functions are a vector (N,).
+
+    known: the fixed coefficients (c, n_u, n_v, n_w) on each patch; zero by default.
+    """
     if why := why_no_adjoint(system):
         raise ValueError(f"the adjoint is not solved for: {why}")
     rest = replace(system.at_rest(), right=right.reshape(system.right.shape))
+    if known is not None:
+        patches = zip(system.patches, known, strict=True)
+        rest = replace(rest, patches=tuple(replace(patch, known=own) for patch, own in patches))
     with one_blas_thread():
         found = rest._iterate(IterationOptions(tolerance=tolerance))
     return rest.field(found.x)

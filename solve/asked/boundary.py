@@ -57,12 +57,14 @@ class Given:
 class Piece:
     """Hold m Gauss points of outer faces of one name, of patches with equal knots, law and data.
 
-    patches: (m,). places: (m, 3), parameters. x, normal: (3, m), points and outward unit normals. weights: (m,), of
+    group: the patches, with the solution. rows: (m,), the patch of each point in it.
+    places: (m, 3), parameters. x, normal: (3, m), points and outward unit normals. weights: (m,), of
     integrals over the surface. curvature: (m,), the sum of the principal ones, positive on a sphere. elements: (m,),
     numbers of the spans, from 0. u: a solution. z: adjoints. source: (c, m).
     """
 
-    patches: IntArray
+    group: FieldGroup
+    rows: IntArray
     places: Array
     x: Points
     normal: Array
@@ -142,12 +144,13 @@ def _piece(
     nets = [np.take(body.patches[number].control_points, -side, axis=axis).reshape(-1, 3) for number in own]
     data = _Data(problem, FACE_NAMES[grid.face], x, normal, weights, STEP * body.size)
     return Piece(
-        patches=group.numbers[owners],
+        group=group,
+        rows=owners,
         places=where,
         x=x,
         normal=normal,
         weights=weights,
-        curvature=_curvature(group, owners, where, axis, jacobian, normal),
+        curvature=curvature(group, owners, where, axis, jacobian, normal),
         elements=np.repeat(np.arange(len(chosen)), len(grid.weights)) * (1 + int(grid.spans.max()))
         + np.tile(grid.spans, len(chosen)),
         u=_values(group, problem, owners, where),
@@ -169,7 +172,7 @@ def _values(group: FieldGroup, problem: BoundaryValueProblem, owners: IntArray, 
     return Values(u, grad.reshape(c, 3, m), flux.reshape(c, 3, m), react)
 
 
-def _curvature(group: FieldGroup, owners: IntArray, where: Array, axis: int, jacobian: Array, normal: Array) -> Array:
+def curvature(group: FieldGroup, owners: IntArray, where: Array, axis: int, jacobian: Array, normal: Array) -> Array:
     """Return the sum (m,) of the principal curvatures of faces across a direction: the divergence of the normal."""
     a, b = (d for d in range(3) if d != axis)
     orders = [tuple(int(d == one) + int(d == other) for d in range(3)) for one, other in ((a, a), (a, b), (b, b))]

@@ -165,11 +165,16 @@ class Reaction(Functional):
         balance = getattr(getattr(solution, "report", None), "balance", None)
         if balance is None:
             raise ValueError(f"{self.ask.role}: the solution has no balance of loads and reactions")
-        own = [force for role, force in balance.reactions.items() if role in self.roles or self._is_on_face(role)]
-        component = "xyz".index(self.ask.direction) if self.ask.direction else 0
-        return float(sum(force[component] for force in own)), None
+        own = [force for role, force in balance.reactions.items() if role in self.roles or self.is_on_face(role)]
+        return float(sum(force[self.component] for force in own)), None
 
-    def _is_on_face(self, role: str) -> bool:
+    @property
+    def component(self) -> int:
+        """Return the component of u along which the reaction is asked for."""
+        return "xyz".index(self.ask.direction) if self.ask.direction else 0
+
+    def is_on_face(self, role: str) -> bool:
+        """Return whether a reaction of that name in a balance is that of one of the faces."""
         return any(role == face or role.endswith(f"_{face}") for face in self.faces)
 
 

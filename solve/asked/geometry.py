@@ -10,9 +10,10 @@ H the sum of the principal curvatures. A pressure p, whose direction turns with 
 the third term. To first order the distance changes J by the integral of the density times V_n.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from math import hypot
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 
@@ -22,7 +23,10 @@ from ..field import BodyField
 from ..solution import Solution
 from .boundary import Piece, Values, pieces_of
 
+Density = Callable[[Piece, Values], Array]
 
+
+@runtime_checkable
 class TrueSurface(Protocol):
     """Describe the surface that the boundary of a spline approximates."""
 
@@ -34,26 +38,42 @@ class TrueSurface(Protocol):
 class GeometryPart:
     """Hold what the distance to the true surface changes in a quantity.
 
-    change: J on the true body minus J on the spline's, to first order. part: the sum over the spans of the boundary of
-    what each changes, without signs. distance: the largest one along a normal.
+    change: J on the true body minus J on the spline's, to first order. spread: the root of the sum over the spans of
+    the boundary of the squares of what each changes: it is large where large changes cancel, as around a place on the
+    boundary. distance: the largest one along a normal.
     """
 
     change: float
-    part: float
+    spread: float
     distance: float
 
+    @property
+    def part(self) -> float:
+        """Return half of the width that the distance gives an interval.
 
-def geometry_parts(solution: Solution, adjoints: Sequence[BodyField], surface: TrueSurface) -> list[GeometryPart]:
-    """Return what the distance to a surface changes in the quantity of each adjoint."""
-    changes, parts, distance = np.zeros(len(adjoints)), np.zeros(len(adjoints)), 0.0
+        On a hollow cylinder the change was right to 10 %; the sum without signs was up to 50 times as large.
+        """
+        return hypot(self.change, self.spread)
+
+
+def geometry_parts(
+    solution: Solution, adjoints: Sequence[BodyField], surface: TrueSurface, more: Sequence[Density] = ()
+) -> list[GeometryPart]:
+    """Return what the distance to a surface changes in the quantity of each adjoint.
+
+    more: for each quantity the density of its own change, with the solution as it is; by default there is none.
+    """
+    changes, squares, distance = np.zeros(len(adjoints)), np.zeros(len(adjoints)), 0.0
     for piece in pieces_of(solution, adjoints):
         offset = surface.offsets(np.ascontiguousarray(piece.x.T), np.ascontiguousarray(piece.normal.T))
         distance = max(distance, float(np.abs(offset).max()))
         for number, z in enumerate(piece.z):
-            each = np.bincount(piece.elements, piece.weights * offset * density(piece, z))
+            slope = density(piece, z) + (more[number](piece, z) if more else 0.0)
+            each = np.bincount(piece.elements, piece.weights * offset * slope)
             changes[number] += each.sum()
-            parts[number] += np.abs(each).sum()
-    return [GeometryPart(change, part, distance) for change, part in zip(changes.tolist(), parts.tolist(), strict=True)]
+            squares[number] += each @ each
+    rows = zip(changes.tolist(), np.sqrt(squares).tolist(), strict=True)
+    return [GeometryPart(change, spread, distance) for change, spread in rows]
 
 
 def density(piece: Piece, z: Values) -> Array:

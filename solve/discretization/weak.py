@@ -236,6 +236,14 @@ class WeakFace:
         density = np.einsum("cdm,dm->cm", self.projector, flux) - pull
         return np.asarray((self.weights * density)[:, points].sum(axis=1))
 
+    def add_force(self, direction: Array, points: Mask, result: Array) -> None:
+        """Add the part that depends on u of `force` along a direction (c,), of each function, to (k, c, n_u, n_v, n_w).
+
+        points: (m,), the mask of those whose reaction is meant.
+        """
+        along = np.einsum("cdm,d->cm", self.held * points, direction)
+        self._spread(-self.gamma * along, along, result)
+
     def _layer(self, coefficients: Array, layer: tuple[int | slice, ...]) -> Array:
         """Return the coefficients (k n_b n_c, c) of a layer."""
         own = np.moveaxis(coefficients[:, :, *layer], 1, -1)  # (k, n_b, n_c, c)

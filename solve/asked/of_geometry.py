@@ -1,0 +1,88 @@
+"""Finds the part of the geometry in the interval of each asked quantity."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from parameterize.spline.interface import axis_side
+
+from ..field import BodyField
+from ..mixed import MixedSystem
+from ..solution import Solution
+from ..system import System
+from .adjoint import adjoint, adjoint_of, why_no_adjoint
+from .functional import Functional, Reaction
+from .geometry import GeometryPart, TrueSurface, geometry_parts
+from .own_change import OwnChange
+
+NO_SURFACE = "the part's surface is not known"
+
+
+def surface_of(solution: Solution) -> TrueSurface | None:
+    """Return the part's surface mesh that the regions of a problem know; None where they know none."""
+    known: list[Any] = [condition.region.surface for condition in solution.problem.conditions]
+    return next((one for one in known if isinstance(one, TrueSurface)), None)
+
+
+def of_geometry(
+    system: System, solution: Solution, functionals: Sequence[Functional], surface: TrueSurface | None = None
+) -> list[GeometryPart | str]:
+    """Return what the distance to the true surface changes in each quantity of a solution, or why it is not known.
+
+    surface: by default that of `surface_of`.
+    """
+    surface = surface or surface_of(solution)
+    if surface is None:
+        return [NO_SURFACE] * len(functionals)
+    adjoints = [_adjoint(system, solution, one) for one in functionals]
+    chosen = [number for number, z in enumerate(adjoints) if isinstance(z, BodyField)]
+    own = [OwnChange.of(functionals[number], solution) for number in chosen]
+    fields = [z for z in adjoints if isinstance(z, BodyField)]
+    parts = geometry_parts(solution, fields, surface, [one.density for one in own])
+    found = dict(zip(chosen, parts, strict=True))
+    for number, one in zip(chosen, own, strict=True):
+        found[number] = replace(found[number], change=found[number].change + one.beside(surface))
+    return [found[number] if isinstance(z, BodyField) else z for number, z in enumerate(adjoints)]
+
+
+def _adjoint(system: System, solution: Solution, functional: Functional) -> BodyField | str:
+    """Return the adjoint of a quantity, or why there is none."""
+    if why := why_no_adjoint(system):
+        return why
+    if isinstance(functional, Reaction):
+        return _of_reaction(system, functional)
+    samples = functional.samples(solution)
+    return "the quantity has no linearisation" if samples is None else adjoint(system, samples)
+
+
+def _of_reaction(system: System, reaction: Reaction) -> BodyField | str:
+    """Return the adjoint of a reaction, which is -1 on its supports along its direction, and 0 on other ones."""
+    problem = system.problem
+    is_elastic = any(one.role in reaction.roles and one.factor is not None for one in problem.conditions)
+    if isinstance(system, MixedSystem) or is_elastic or problem.faces and not problem.dirichlet:
+        return "the adjoint of this reaction is not known"
+    unit = np.zeros(problem.form.components)
+    unit[reaction.component] = 1.0
+    layout = system.matrix.layout
+    shift, right = layout.empty(len(unit)), layout.empty(len(unit))
+    for number, patch in enumerate(system.patches):
+        for name in patch.space.dirichlet:
+            support = patch.problem.strong_on(name)
+            if support is not None and (
+                support.role in reaction.roles or reaction.is_on_face(patch.problem.prefix + name)
+            ):
+                axis, side = axis_side(name)
+                layer = tuple(-side if a == axis else slice(None) for a in range(3))
+                shift[number][:, *layer] = unit[:, None, None]
+    for face in system.matrix.weak:
+        held = np.zeros(len(face.weights), dtype=bool)
+        for i, condition in enumerate(problem.conditions):
+            held |= face.holds(i) & (condition.is_essential and condition.role in reaction.roles)
+        own = np.zeros((len(face.patches), *right.of(face.patches).shape[1:]))
+        face.add_force(unit, held, own)
+        right.add(face.patches, own)
+    whole = layout.joined(system.unknowns.completed(shift))
+    total = system.unknowns.collect(right + system.matrix.apply(whole))
+    return adjoint_of(system, total, known=-1.0 * whole)
