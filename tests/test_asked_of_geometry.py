@@ -66,7 +66,7 @@ def test_quantities_of_a_pressed_cylinder() -> None:
 
 def test_quantities_of_heat() -> None:
     problem = iga_nn.Poisson(source="1", value={"u0": 1, "u1": 0.5})
-    asks = {"energy": 0.05, "integral u over u1": 0.05, "reaction of u0": 0.05, "flow over u1": 0.05}
+    asks = {"energy": 0.05, "mean u": 0.05, "reaction of u0": 0.05, "flow over u1": 0.05}
     _demand_changes(problem, asks, refine=0)
 
 
