@@ -23,8 +23,8 @@ from .forms.form import Form, Quantity
 
 Place = tuple[float, float, float]
 Inside = Callable[[Any], Mask]  # whether an extreme may lie at points (3, ...)
-_PER_SPAN = 3  # intervals a span and direction in which extremes are looked for
-_SAMPLES = 2**16  # of a search for all extremes, where one a span is not more
+PER_SPAN = 3  # intervals a span and direction in which extremes are looked for
+SAMPLES = 2**16  # of a search for all extremes, where one a span is not more
 _CANDIDATES = 8  # samples around which they are refined
 _ZOOMS = 20  # steps of this, each halving the box
 _POINTS = 2**16  # evaluated at once
@@ -42,6 +42,13 @@ class Extremes:
     least_at, largest_at : three float
         Points in space.
     least_parameters, largest_parameters : three float
+    spans : float, optional
+        The search left out what lies within so many spans of a singular place; 0 where nothing else is left of a coarse
+        mesh, and None where the body has no such place, or the quantity none there.
+    radius : float
+        The largest of these radii.
+    beside : bool
+        Whether the largest value lies where the mesh of one refinement less left it out.
 
     Examples
     --------
@@ -59,14 +66,23 @@ class Extremes:
     largest: float
     largest_at: Place
     largest_parameters: Place
+    spans: float | None = None
+    radius: float = 0.0
+    beside: bool = False
 
     def as_dict(self) -> dict[str, Any]:
         """Return the values and the points for report.json."""
-        return {name: getattr(self, name) for name in ("least", "least_at", "largest", "largest_at")}
+        names = ("least", "least_at", "largest", "largest_at")
+        names += () if self.spans is None else ("spans", "radius", "beside")  # type: ignore[assignment]
+        return {name: getattr(self, name) for name in names}
 
     def __str__(self) -> str:
         least, largest = in_brackets(self.least_at), in_brackets(self.largest_at)
-        return f"from {self.least:.6g} at {least} to {self.largest:.6g} at {largest}"
+        found = f"from {self.least:.6g} at {least} to {self.largest:.6g} at {largest}"
+        if self.spans is None:
+            return found
+        far = f"farther than {self.radius:.3g} from" if self.spans else "all of the mesh near to"
+        return f"{found}, {far} where it is infinite"
 
 
 def quantity_of(form: Form, what: str | Quantity) -> Quantity:
@@ -169,7 +185,7 @@ def _of_shape(found: Array, shape: tuple[int, ...]) -> Array:
 def extremes(solution: FieldOnBody, what: str | Quantity) -> Extremes:
     """Return the least and the largest value of a quantity of one number a point, and their places."""
     groups = groups_of(solution)
-    (found,) = extremes_of(groups, [[quantity_of(_form_of(group), what)] for group in groups], _PER_SPAN)
+    (found,) = extremes_of(groups, [[quantity_of(form_of(group), what)] for group in groups], PER_SPAN)
     return found
 
 
@@ -179,19 +195,20 @@ def all_extremes(solution: FieldOnBody) -> dict[str, Extremes]:
     The search uses fewer samples a span than `extremes`, so that it takes a small part of the time of a solve.
     """
     groups = groups_of(solution)
-    per_span = samples_per_span(groups, _SAMPLES)
-    names = _form_of(groups[0]).reported
-    quantities = [[quantity_of(_form_of(group), name) for name in names] for group in groups]
+    per_span = samples_per_span(groups, SAMPLES)
+    names = form_of(groups[0]).reported
+    quantities = [[quantity_of(form_of(group), name) for name in names] for group in groups]
     return dict(zip(names, extremes_of(groups, quantities, per_span), strict=True))
 
 
 def samples_per_span(groups: Sequence[FieldGroup], most: int) -> int:
     """Return how many intervals a span and direction a search takes that has no more samples than `most`, if it can."""
     spans = sum(len(group) * math.prod(len(breakpoints(knots)) - 1 for knots in group.values.knots) for group in groups)
-    return max(1, min(_PER_SPAN, int((most / spans) ** (1.0 / 3.0))))
+    return max(1, min(PER_SPAN, int((most / spans) ** (1.0 / 3.0))))
 
 
-def _form_of(group: FieldGroup) -> Form:
+def form_of(group: FieldGroup) -> Form:
+    """Return the law of a group."""
     assert group.problem is not None, "a solution knows its problem"
     return group.problem.form
 

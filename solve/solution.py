@@ -19,6 +19,7 @@ from .discretization.error_norms import Errors
 from .field import BodyField, SplineField
 from .forms.boundary_value_problem import BoundaryValueProblem
 from .forms.form import Quantity
+from .outside import all_extremes_outside, extremes_outside
 from .quantities import Extremes, all_extremes, at_points, extremes, on_grid
 from .reactions import Balance
 from .singular import SingularPlaces, singular_places
@@ -236,7 +237,12 @@ class Solution(BodyField, Shown):
 
     @cached_property
     def singular(self) -> SingularPlaces:
-        """Return the places where the gradient is infinite, as the body's edges and the data say."""
+        """Return the places where the gradient is infinite, as the body's edges and the data say.
+
+        There are none where the exact solution is known.
+        """
+        if self.problem.exact is not None:
+            return SingularPlaces()
         return singular_places(self.body, [one.problem for one in self.patches], [one.knots for one in self.patches])
 
     @property
@@ -278,16 +284,20 @@ class Solution(BodyField, Shown):
         """Return a quantity (len(u), len(v), len(w), ...) on a tensor grid of parameters of one patch."""
         return self.only.quantity_grid(what, u, v, w)
 
-    def extremes(self, what: str | Quantity) -> Extremes:
-        """Return the least and the largest value of a quantity of one number a point, and their places."""
-        return extremes(self, what)
+    def extremes(self, what: str | Quantity, everywhere: bool = False) -> Extremes:
+        """Return the least and the largest value of a quantity of one number a point, and their places.
+
+        Of a gradient, a flux or a stress they are those outside of the singular places, where it is infinite, unless
+        asked for everywhere.
+        """
+        return extremes(self, what) if everywhere else extremes_outside(self, what, self.singular)
 
     def all_extremes(self) -> dict[str, Extremes]:
         """Return the extremes of a report, by name (`problem.form.reported`), from one search for all quantities.
 
-        The search uses fewer samples than `extremes` on fine meshes.
+        They are those of `extremes`. The search uses fewer samples on fine meshes.
         """
-        return all_extremes(self)
+        return all_extremes_outside(self, self.singular)
 
     def to_pyvista(
         self, samples: int | None = None, quantities: Iterable[str] | Mapping[str, Quantity] | None = None

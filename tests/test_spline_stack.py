@@ -9,6 +9,7 @@ from bodies import ring
 import iga_nn
 from parameterize.spline.patch_groups import groups_of as groups_of_patches
 from solve.field_groups import groups_of
+from solve.quantities import all_extremes
 
 
 @pytest.fixture(params=[False, True], ids=["polynomial", "rational"])
@@ -53,7 +54,7 @@ def test_the_extremes_of_a_body_are_the_outermost_of_its_patches():
     kappa = iga_nn.solve(body, iga_nn.Poisson(exact="4+x")).field
     heat = iga_nn.solve(body, iga_nn.Poisson(source="1", boundary="0", kappa=kappa))
     for solution, name in ((stiff, "von_mises"), (heat, "flux_magnitude")):
-        found, each = solution.all_extremes()[name], [patch.extremes(name) for patch in solution.patches]
+        found, each = all_extremes(solution)[name], [patch.extremes(name) for patch in solution.patches]
         top = max(each, key=lambda one: one.largest)
         assert found.largest == pytest.approx(top.largest, rel=1e-6)
         np.testing.assert_allclose(found.largest_at, top.largest_at, atol=1e-3)

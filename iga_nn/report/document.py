@@ -274,7 +274,7 @@ def verdict(report: Report, folder: Path) -> Report:
     if refinement := quality.get("refinement"):
         short["refinement"] = refinement
     if section := solved(report):
-        keys = ("dofs", *EXACT_ERRORS, *ESTIMATES, "iterations", "converged", "meaningful", "extremes")
+        keys = ("dofs", *EXACT_ERRORS, *ESTIMATES, "iterations", "converged", "meaningful", "singular", "extremes")
         short["levels"] = [{key: level[key] for key in keys if key in level} for level in section["levels"]]
         short["notices"] = section["notices"]
     if vibration := report.get("modes"):

@@ -1,12 +1,14 @@
-"""Shows the extremes of a solve's levels side by side, and whether the largest stress grows under refinement.
+"""Shows the extremes of a solve's levels side by side, where stresses are infinite, and where they yet grow.
 
-Levels and sections are those of report.json; older reports have no extremes. A section's `unit` and `stress_unit` are
-free text, which is shown behind the numbers and changes no number.
+Levels and sections are those of report.json; older reports have no extremes, or know no singular places. A section's
+`unit` and `stress_unit` are free text, which is shown behind the numbers and changes no number.
 """
 
 import math
 from collections.abc import Sequence
 from typing import Any
+
+from parameterize.arrays import listed
 
 Level = dict[str, Any]
 
@@ -22,12 +24,17 @@ SAYINGS = {  # quantity -> its words, the extreme that they name, and the sectio
 STRESS = "von_mises"
 DERIVATIVES = {STRESS: "von Mises stress", "flux_magnitude": "|flux|", "gradient_magnitude": "|gradient|"}
 GROWTH = 1.1  # of the largest stress while h is halved; smooth ones, resolved, grow less, at clamped rims 1.2 and more
+MOST_PLACES = 3  # named where a stress is infinite
 TINY = 1e-6  # of the largest coordinate: smaller ones are shown as 0
 
 
 def lines(section: dict[str, Any]) -> list[str]:
-    """Return one line for each extreme: its values on all levels and its place on the finest level."""
-    return [f"{said} {' → '.join(values)} {at}" for said, *values, at in _rows(section)]
+    """Return one line for each extreme: its values on all levels and its place on the finest level.
+
+    Where a stress or a gradient is infinite, the first line says so.
+    """
+    infinite = [f"{_infinite(section)} {where}"] if (where := _where_infinite(section)) else []
+    return infinite + [f"{said} {' → '.join(values)} {at}" for said, *values, at in _rows(section)]
 
 
 def table(section: dict[str, Any]) -> list[list[str]]:
@@ -35,8 +42,10 @@ def table(section: dict[str, Any]) -> list[list[str]]:
 
     The table is empty where no extremes are known.
     """
-    rows = _rows(section)
-    return [["", *(f"{level['dofs']:,} unknowns" for level in _known(section)), "where"], *rows] if rows else []
+    rows, known = _rows(section), _known(section)
+    if where := _where_infinite(section):
+        rows.insert(0, [_infinite(section), *("∞" if level.get("singular") else "–" for level in known), where])
+    return [["", *(f"{level['dofs']:,} unknowns" for level in known), "where"], *rows] if rows else []
 
 
 def finest(section: dict[str, Any]) -> dict[str, tuple[float, str]]:
@@ -48,29 +57,49 @@ def finest(section: dict[str, Any]) -> dict[str, tuple[float, str]]:
     for name, said, end, unit in _worded(section):
         extreme = _known(section)[-1]["extremes"][name]
         title = f"{said} [{section[unit]}]" if section.get(unit) else said
-        found[title] = (extreme[end], f"{extreme[end]:.4g} at {_place(extreme[f'{end}_at'], section)}")
+        found[title] = (extreme[end], f"{extreme[end]:.4g} at {_at(extreme, end, section)}")
     return found
 
 
-def growth_notices(section: dict[str, Any]) -> list[str]:
+def peak_notices(section: dict[str, Any]) -> list[str]:
+    """Return the notices on the largest stress, or gradient: where it is infinite, and where it yet grows."""
+    known = _known(section)
+    if known and "singular" not in known[-1]:  # of a version that did not know these places
+        return _growth(known, section) if len(known) > 1 else _of_one_level(known, section)
+    return [*_of_singular_places(known, section), *_growth(known, section)]
+
+
+def _of_singular_places(known: Sequence[Level], section: dict[str, Any]) -> list[str]:
+    """Return the notice on the places where the stress is infinite; none where it is finite."""
+    where = _where_infinite(section)
+    name = next((name for name in DERIVATIVES if known and name in known[-1]["extremes"]), None)
+    if not where or name is None:
+        return []
+    found, unit = known[-1]["extremes"][name], _behind(section.get(SAYINGS[name][2]))
+    begin = f"the {_infinite(section)} {where}, and what a mesh gives there is no result"
+    if not found.get("spans"):
+        return [
+            f"{begin}: all of this mesh lies near to these places; one more --refine, or more, leaves a part to read"
+        ]
+    return [f"{begin}; {SAYINGS[name][0]} {found['largest']:.4g}{unit} at {_at(found, 'largest', section)}"]
+
+
+def _growth(known: Sequence[Level], section: dict[str, Any]) -> list[str]:
     """Return a notice where the largest stress, or gradient, grew by more than GROWTH for each time h was halved.
 
-    One level of a stress has a notice that nothing is known of its growth.
+    Growth beside a place where it is infinite is known.
     """
-    if len(known := _known(section)) < 2:
-        return _of_one_level(known, section)
-    coarse, fine = known[-2:]
-    for name, title in DERIVATIVES.items():
-        if name not in coarse["extremes"] or name not in fine["extremes"]:
+    for name, title in DERIVATIVES.items() if len(known) > 1 else ():
+        coarse, fine = known[-2:]
+        if name not in coarse["extremes"] or name not in fine["extremes"] or fine["extremes"][name].get("beside"):
             continue
         before, now = (level["extremes"][name]["largest"] for level in (coarse, fine))
         if before > 0.0 and now > before * GROWTH ** math.log2(coarse["h"] / fine["h"]):
             grew = f"grew from {before:.4g} to {now:.4g}{_behind(section.get(SAYINGS[name][2]))}"
             where = _place(fine["extremes"][name]["largest_at"], section)
             return [
-                f"the largest {title} {grew} under the last refinement, at {where}: where it keeps growing, as at a "
-                "clamped rim or a re-entrant edge, it is infinite there and the number is no result; one more --refine "
-                "tells"
+                f"the largest {title} {grew} under the last refinement, at {where}: the mesh does not resolve it, or "
+                "it is infinite there, as at an edge that the spline rounds off; one more --refine tells"
             ]
     return []
 
@@ -84,6 +113,28 @@ def _of_one_level(known: Sequence[Level], section: dict[str, Any]) -> list[str]:
         f"the largest {DERIVATIVES[STRESS]}, at {where}, is known on one level alone: at a clamped rim or a re-entrant "
         "edge it is infinite, and the number is no result; --refine 0 1 tells whether it grows"
     ]
+
+
+def _infinite(section: dict[str, Any]) -> str:
+    """Return the words for what is infinite."""
+    return "stress is infinite at" if STRESS in _known(section)[-1]["extremes"] else "gradient is infinite at"
+
+
+def _where_infinite(section: dict[str, Any]) -> str:
+    """Return the words for the places where the stress is infinite; "" where it is finite everywhere."""
+    known = _known(section)
+    return listed([place["text"] for place in known[-1].get("singular", ())], MOST_PLACES) if known else ""
+
+
+def _at(extreme: dict[str, Any], end: str, section: dict[str, Any]) -> str:
+    """Return the place of an extreme as text, and how far it is from where the stress is infinite."""
+    at = _place(extreme[f"{end}_at"], section)
+    if (spans := extreme.get("spans")) is None:
+        return at
+    if not spans:
+        return f"{at}, a number without meaning: all of the mesh lies near to where the stress is infinite"
+    radius = f"{extreme['radius']:.3g}{_behind(section.get('unit'))}"
+    return f"{at}, farther than {spans:g} span{'' if spans == 1.0 else 's'} ({radius}) from there"
 
 
 def _place(point: Sequence[float], section: dict[str, Any]) -> str:
@@ -108,7 +159,7 @@ def _rows(section: dict[str, Any]) -> list[list[str]]:
         levels = [level["extremes"].get(name) for level in _known(section)]
         values = ["–" if level is None else f"{level[end]:.4g}" for level in levels]
         values[-1] += _behind(section.get(unit))
-        rows.append([said, *values, f"at {_place(levels[-1][f'{end}_at'], section)}"])
+        rows.append([said, *values, f"at {_at(levels[-1], end, section)}"])
     return rows
 
 

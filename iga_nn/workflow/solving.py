@@ -19,7 +19,7 @@ from ..figures.fields import NAMED
 from ..options import NO_UNITS, ProblemOptions, Units
 from ..report import document as reports
 from ..report import html
-from ..report.extremes import growth_notices
+from ..report.extremes import peak_notices
 from .levels import SOLUTION, KeptLevels, Levels
 from .output_folder import RunFolder
 
@@ -59,7 +59,7 @@ def solve_levels(
             state.write(**{problem_options.section: section_of(problem_options, problem, body, done)})
             if kept and is_finite(solution):
                 kept.save(done)
-    for notice in _growth(problem_options, problem, done):
+    for notice in _peaks(problem_options, problem, done):
         log.warning("%s", notice)
     _show(state, body, done, problem, problem_options)
     assert done.finest is not None  # there is one level at least
@@ -71,7 +71,7 @@ def section_of(
 ) -> dict[str, Any]:
     """Return the section of report.json on a problem and the levels that are done."""
     known = problem_options.values("refine", "degree") | described(problem, body)
-    notices = [*notices_of(done.reports), *_growth(problem_options, problem, done)]
+    notices = [*notices_of(done.reports), *_peaks(problem_options, problem, done)]
     return (
         {name: value for name, value in known.items() if value is not None and value != ()}
         | ({"regions": regions_of(problem, done.reports[-1])} if problem.conditions else {})
@@ -79,9 +79,9 @@ def section_of(
     )
 
 
-def _growth(problem_options: ProblemOptions, problem: BoundaryValueProblem, done: Levels) -> list[str]:
-    """Return the notices on what grows from level to level; none where the exact solution is known."""
-    return growth_notices({**asdict(problem_options), "levels": done.entries}) if problem.exact is None else []
+def _peaks(problem_options: ProblemOptions, problem: BoundaryValueProblem, done: Levels) -> list[str]:
+    """Return the notices on where stresses are infinite or yet grow; none where the exact solution is known."""
+    return peak_notices({**asdict(problem_options), "levels": done.entries}) if problem.exact is None else []
 
 
 def _show(
@@ -98,15 +98,16 @@ def _show(
 
 
 def level_of(solution: Solution) -> dict[str, Any]:
-    """Return a level of report.json: the report of its solve and the extremes, where the solution has finite ones."""
-    level, extremes = solution.report.as_dict(), {}
+    """Return a level of report.json: that of its solve, singular places, and extremes if they are finite."""
+    level, found = solution.report.as_dict(), dict[str, Any]()
     started = time.process_time()
     try:
-        extremes = {name: found.as_dict() for name, found in solution.all_extremes().items()}
+        found["singular"] = [place.as_dict() for place in solution.singular]
+        found["extremes"] = {name: one.as_dict() for name, one in solution.all_extremes().items()}
     except (ValueError, MemoryError) as error:  # not finite: the solver broke down, or det J is zero somewhere
         log.info("no extremes: %s", one_line(error) or "the memory does not suffice")
     seconds = level["seconds"] | {"extremes": time.process_time() - started}
-    return level | {"extremes": extremes, "seconds": seconds}
+    return level | {"extremes": {}, "seconds": seconds} | found
 
 
 def each_level(

@@ -108,4 +108,4 @@ class Supports:
 
 def _words(condition: Condition) -> str:
     """Return the words for a condition of a keyword of faces."""
-    return f"{condition.role} on {condition.region}"
+    return f"the {condition.role} on {condition.region}"

@@ -86,9 +86,17 @@ class SingularPlaces:
         where = np.asarray(points, dtype=np.float64)
         if not self.places:
             return np.zeros(len(where), dtype=bool)
-        radii = spans * self._spans
-        distances, nearest = self._tree.query(where, distance_upper_bound=radii.max())
-        return np.asarray(distances < np.append(radii, 0.0)[nearest])
+        radii, found = spans * self._spans, np.zeros(len(where), dtype=bool)
+        low, high = self._box
+        inside = np.flatnonzero(((where > low - radii.max()) & (where < high + radii.max())).all(axis=1))
+        distances, nearest = self._tree.query(where[inside], distance_upper_bound=radii.max())
+        found[inside] = distances < np.append(radii, 0.0)[nearest]
+        return found
+
+    @cached_property
+    def _box(self) -> tuple[Array, Array]:
+        points: Array = self._tree.data
+        return points.min(axis=0), points.max(axis=0)
 
     @cached_property
     def _tree(self) -> cKDTree:
