@@ -28,6 +28,7 @@ _HOME = {  # module, and the name there where it is another one; type checkers r
     "Fix": "solve.forms.conditions",
     "Flux": "solve.forms.conditions",
     "Form": "solve",
+    "Grading": "solve",
     "InputError": "iga_nn.errors",
     "Interface": "parameterize.spline.interface",
     "Load": "solve.forms.conditions",

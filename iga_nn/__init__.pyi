@@ -11,6 +11,7 @@ from parameterize.surface.surface import load_surface as load_surface
 from solve import Ask as Ask
 from solve import Elasticity as Elasticity
 from solve import Form as Form
+from solve import Grading as Grading
 from solve import March as March
 from solve import Modes as Modes
 from solve import Poisson as Poisson

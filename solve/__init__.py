@@ -24,6 +24,7 @@ from parameterize.old_names import renamed
 from .answer import Answer as Answer
 from .ask import Ask as Ask
 from .diagnostics import ConvergenceError as ConvergenceError
+from .discretization.grading import Grading as Grading
 from .field import BodyField as BodyField
 from .field import SplineField as SplineField
 from .forms.elasticity import Elasticity as Elasticity

@@ -20,6 +20,7 @@ from parameterize.threads import one_blas_thread
 
 from .assembly import Assembled, assemble_body_data
 from .diagnostics import ConvergenceError
+from .discretization.grading import Grading
 from .discretization.groups import OnPatches
 from .discretization.projection import projected
 from .discretization.unknowns import Unknowns, unknowns_of
@@ -91,6 +92,7 @@ def march(
     callback: Callable[[float, BodyField], object] | None = None,
     refine: int = 0,
     degree: int | None = None,
+    grading: Grading | None = None,
     threads: int | None = None,
     quadrature: str = SolveOptions.quadrature,
     tolerance: float = 1e-10,
@@ -125,7 +127,7 @@ def march(
         Number of steps between two fields that are kept; the last field is always kept.
     callback : function, optional
         Function that is called with time and field after every step.
-    refine, degree, threads, quadrature, tolerance, max_iterations
+    refine, degree, grading, threads, quadrature, tolerance, max_iterations
         As in `iga_nn.solve`.
 
     Returns
@@ -154,6 +156,7 @@ def march(
     options = SolveOptions(
         refine=refine,
         degree=degree,
+        grading=grading,
         threads=threads,
         quadrature=quadrature,
         tolerance=tolerance,

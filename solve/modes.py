@@ -17,6 +17,7 @@ from parameterize.spline.body import BodyLike
 from parameterize.threads import one_blas_thread
 
 from .diagnostics import TOO_STIFF, ConvergenceError, bending_notices
+from .discretization.grading import Grading
 from .field import BodyField
 from .forms.boundary_value_problem import BoundaryValueProblem
 from .forms.owners import Owner, demand_positive, of_each_patch
@@ -104,6 +105,7 @@ def modes(
     *,
     refine: int = 0,
     degree: int | None = None,
+    grading: Grading | None = None,
     threads: int | None = None,
     quadrature: str = SolveOptions.quadrature,
     tolerance: float = 1e-4,
@@ -124,7 +126,7 @@ def modes(
         Mass per volume, of the whole body or for each of its solids, {"steel": 7850.0, "pad": 1100.0}.
     n : int
         Number of modes.
-    refine, degree, threads, quadrature
+    refine, degree, grading, threads, quadrature
         As in `iga_nn.solve`.
     tolerance : float
         Tolerance of the residuals `|K phi - omega^2 M phi| / |K phi|`, of a factorized system in the norm of K^-1; its
@@ -157,7 +159,7 @@ def modes(
         raise ValueError(f"{type(law.form).__name__} is not linear: it has modes about a state only, and no others")
     if not law.form.symmetric:
         raise ValueError(f"{type(law.form).__name__} is not symmetric: its modes need not be real, and are not sought")
-    options = SolveOptions(refine=refine, degree=degree, threads=threads, quadrature=quadrature)
+    options = SolveOptions(refine=refine, degree=degree, grading=grading, threads=threads, quadrature=quadrature)
     system = discretized(body, law, options, is_loose=True).at_rest()
     densities = of_each_patch("density", density, system.body.solids)
     largest = float(densities.max())  # the iteration sees densities near 1, in any units

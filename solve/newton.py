@@ -18,6 +18,7 @@ from parameterize.threads import one_blas_thread
 from .assembly import OnePatch, assemble_body_data
 from .diagnostics import ConvergenceError, judge
 from .discretization.error_norms import Compared, error_norms
+from .discretization.grading import Grading
 from .discretization.groups import OnPatches
 from .discretization.nonlinear import Forces, Tangent
 from .discretization.on_regions import demand_area
@@ -54,6 +55,7 @@ def newton(
     load_steps: int = 1,
     refine: int = 0,
     degree: int | None = None,
+    grading: Grading | None = None,
     threads: int | None = None,
     quadrature: str = SolveOptions.quadrature,
     tolerance: float = 1e-10,
@@ -75,7 +77,7 @@ def newton(
         Start of the iteration, a field of the same degree in the trial space or a coarser space; zero by default.
     load_steps : int
         Number of equal steps in which source and data on faces grow to their values; each starts at the last solution.
-    refine, degree, threads, quadrature
+    refine, degree, grading, threads, quadrature
         As in `iga_nn.solve`.
     tolerance : float
         Tolerance of the forces that are not balanced, relative to all forces.
@@ -114,6 +116,7 @@ def newton(
     options = SolveOptions(
         refine=refine,
         degree=degree,
+        grading=grading,
         threads=threads,
         quadrature=quadrature,
         tolerance=tolerance,

@@ -9,6 +9,7 @@ from typing import Any, Self
 from parameterize.threads import default_threads
 
 from .ask import Ask, asks_of
+from .discretization.grading import Grading
 from .field import FieldOnBody
 from .forms.boundary_value_problem import BoundaryValueProblem
 
@@ -55,6 +56,7 @@ class SolveOptions(IterationOptions):
 
     refine: int = 0
     degree: int | None = None
+    grading: Grading | None = None
     threads: int | None = None
     quadrature: str = "spline"
     comm: Any = None
@@ -66,6 +68,8 @@ class SolveOptions(IterationOptions):
         object.__setattr__(self, "ask", asks_of(self.ask))
         if self.formulation not in (None, *FORMULATIONS):
             raise ValueError(f"formulation must be one of {', '.join(FORMULATIONS)}, got {self.formulation!r:.80}")
+        if not (self.grading is None or isinstance(self.grading, Grading)):
+            raise ValueError(f"grading must be a Grading, such as Grading.of(body), got {self.grading!r:.80}")
         if self.threads is not None and self.threads < 1:
             raise ValueError(f"threads must be at least 1, got {self.threads}; leave it out for {default_threads()}")
 

@@ -56,11 +56,14 @@ def on_patches(
         raise TypeError(f"problem must be a Poisson, an Elasticity or a Problem, got {type(problem).__name__}")
     _demand_known_faces(body, problem)
     placed, spaces = problem.on(body), dict[Any, TrialSpace]()
-    patches = []
-    for volume, own, outer in zip(body, placed.on_patches(body), body.outer, strict=True):
-        key = volume.degrees, *(row.tobytes() for row in volume.knots), own.dirichlet, outer
+    patches, grading = [], options.grading
+    if grading is not None:
+        grading.check(body)
+    for number, (volume, own, outer) in enumerate(zip(body, placed.on_patches(body), body.outer, strict=True)):
+        places = None if grading is None else grading.places(number)
+        key = volume.degrees, *(row.tobytes() for row in volume.knots), own.dirichlet, outer, places
         if key not in spaces:
-            spaces[key] = trial_space(volume, options.refine, options.degree, own.dirichlet, outer)
+            spaces[key] = trial_space(volume, options.refine, options.degree, own.dirichlet, outer, places)
         patches.append(PatchProblem(volume, own, spaces[key]))
     if body.is_single:
         patches = [replace(patches[0], space=shared_space(patches[0].space, options.comm))]

@@ -8,6 +8,7 @@ from parameterize.spline.body import BodyLike, as_body
 
 from .asked.functional import functional
 from .assembly import assemble_body_data, balanced
+from .discretization.grading import Grading
 from .discretization.on_regions import demand_area, demand_supports
 from .discretization.parted import shared_unknowns
 from .discretization.quadrature import gauss_rule, map_planes
@@ -40,6 +41,9 @@ def solve_problem(body: BodyLike, problem: Poisson | Elasticity | Problem, **how
         Number of times that every span of the map's knots is halved for the trial space; 0 by default.
     degree : int, optional
         Degree of the trial space; the degree of the map by default.
+    grading : Grading, optional
+        Breakpoints of the trial space that are finer at some places; the map's own by default. `refine` halves their
+        spans, too.
     threads : int, optional
         Number of threads; the result does not depend on it. Default: NUMBA_NUM_THREADS, OMP_NUM_THREADS, or all cores.
     quadrature : str
@@ -117,6 +121,7 @@ def discretize(
     *,
     refine: int = 0,
     degree: int | None = None,
+    grading: Grading | None = None,
     threads: int | None = None,
     quadrature: str = SolveOptions.quadrature,
     comm: Any = None,
@@ -126,7 +131,7 @@ def discretize(
 
     Parameters
     ----------
-    body, problem, refine, degree, threads, quadrature, comm, formulation
+    body, problem, refine, degree, grading, threads, quadrature, comm, formulation
         As in `iga_nn.solve`; the errors are the same, too.
 
     Returns
@@ -142,7 +147,13 @@ def discretize(
     ((125, 125), (125,))
     """
     options = SolveOptions(
-        refine=refine, degree=degree, threads=threads, quadrature=quadrature, comm=comm, formulation=formulation
+        refine=refine,
+        degree=degree,
+        grading=grading,
+        threads=threads,
+        quadrature=quadrature,
+        comm=comm,
+        formulation=formulation,
     )
     return discretized(body, problem, options)
 

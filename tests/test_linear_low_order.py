@@ -35,8 +35,8 @@ def elastic(**how):
     return iga_nn.Elasticity(young=1.0, poisson_ratio=0.3, body_force=("0", "0", "-1"), **how)
 
 
-def iterations(body, problem, refine=0):
-    system = iga_nn.discretize(body, problem, refine=refine)
+def iterations(body, problem, **how):
+    system = iga_nn.discretize(body, problem, **how)
     assert isinstance(system.inverse, LowOrder) and not system.inverse.weakness
     return conjugate_gradients(system.product, system.right, system.precondition, 1e-8, 500).iterations
 
@@ -78,7 +78,7 @@ def test_coarser_grids_agree_at_interfaces_and_hold_linear_functions():
 
 @pytest.mark.parametrize("problem", [elastic(fix="p0_u0"), elastic(spring={"x < 1e9": 1e-3})], ids=["held", "springs"])
 def test_a_slender_rod_takes_few_iterations_on_every_level(problem):
-    found = [iterations(rod(), problem, refine) for refine in (0, 1)]
+    found = [iterations(rod(), problem, refine=refine) for refine in (0, 1)]
     assert max(found) <= 100 and found[1] <= 1.5 * found[0]
 
 

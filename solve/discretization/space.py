@@ -16,6 +16,8 @@ from parameterize.spline.patch_groups import groups_of
 from parameterize.spline.volume import AXES, FACE_NAMES, BSplineVolume
 
 Window = tuple[slice, slice, slice]
+Place = tuple[float, ...]  # the breakpoints of a direction, in spans of the map: from 0 to their number
+Places = tuple[Place, Place, Place]  # of a patch, see `grading.Grading`
 Made = TypeVar("Made")
 
 LAYERS = 8  # of elements that are measured at a time: their arrays stay in the cache
@@ -196,10 +198,12 @@ def trial_space(
     degree: int | None = None,
     dirichlet: Collection[str] = FACE_NAMES,
     outer: Collection[str] = FACE_NAMES,
+    places: Places | None = None,
 ) -> TrialSpace:
     """Return the trial space of a volume: every span halved `refine` times, in a degree, by default the map's degree.
 
-    The space is as smooth as the map at the map's own knots, and as smooth as its degree allows at new knots. Raises
+    places: the breakpoints that are halved, by default the map's own. The space is as smooth as the map at the map's
+    own knots, and as smooth as its degree allows at new knots. Raises
     ValueError for numbers that are not whole, a negative `refine`, a `refine` that gives more than MOST_ELEMENTS, or a
     degree below 1 or above MOST_DEGREE.
     """
@@ -209,7 +213,9 @@ def trial_space(
         raise ValueError(f"degree must be a whole number, 1 or more, got {degree!r:.80}")
     if refine < 0:
         raise ValueError(f"refine must be 0 or more (each level halves every span), got {refine}")
-    elements = math.prod(_spans(tuple(knots.tolist())) << int(refine) for knots in volume.knots)
+    own = [tuple(knots.tolist()) for knots in volume.knots]
+    counts = map(_spans, own) if places is None else (len(row) - 1 for row in places)
+    elements = math.prod(count << int(refine) for count in counts)
     if elements > MOST_ELEMENTS:
         raise ValueError(f"refine {refine} gives {elements:.1e} elements, more than {MOST_ELEMENTS:.0e}: lower it")
     if degree is not None and not 1 <= degree <= MOST_DEGREE:
@@ -217,8 +223,8 @@ def trial_space(
             f"degree must be at least 1 and at most {MOST_DEGREE}, got {degree}; leave it out for the map's own degree"
         )
     degrees = volume.degrees if degree is None else (degree,) * 3
-    each = zip(volume.knots, volume.degrees, degrees, strict=True)
-    rows = [_refined(tuple(knots.tolist()), old, new, int(refine)) for knots, old, new in each]
+    each = zip(own, volume.degrees, degrees, places or (None, None, None), strict=True)
+    rows = [_refined(*direction, int(refine)) for direction in each]
     return TrialSpace(degrees, (rows[0], rows[1], rows[2]), dirichlet, outer)
 
 
@@ -228,13 +234,30 @@ def _spans(knots: tuple[float, ...]) -> int:
     return len(breakpoints(np.array(knots))) - 1
 
 
-@lru_cache(maxsize=1024)
-def _refined(knots: tuple[float, ...], old: int, new: int, refine: int) -> Array:
-    """Return the knot vector of degree `new` with every span halved `refine` times, as smooth as `trial_space` says."""
+@lru_cache(maxsize=4096)
+def _refined(knots: tuple[float, ...], old: int, new: int, place: Place | None, refine: int) -> Array:
+    """Return the knot vector of degree `new` with its spans halved `refine` times, as smooth as `trial_space` says.
+
+    place: the breakpoints of these spans; the map's own where it is None.
+    """
     row = same_smoothness(np.array(knots), old, new)
+    if place is not None:
+        breaks = breakpoints(row)
+        inserted = [_at(breaks, s) for s in place if s != int(s)]
+        row = np.sort(np.concatenate([row, inserted]))
     for _ in range(refine):
         row = halved(row)
     return row
+
+
+def _at(breaks: Array, place: float) -> float:
+    """Return the parameter of a dyadic place, by halving its span: to the last bit what `halved` gives."""
+    span, part = int(place), place % 1.0
+    low, high = breaks[span : span + 2]
+    while part:
+        middle, part = (low + high) / 2.0, 2.0 * part
+        low, high, part = (middle, high, part - 1.0) if part >= 1.0 else (low, middle, part)
+    return float(low)
 
 
 def embedded(coefficients: Array, degrees: tuple[int, int, int], knots: Knots, space: TrialSpace) -> Array:
