@@ -2,7 +2,7 @@
 
 import logging
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from numbers import Integral, Real
 from pathlib import Path
@@ -16,6 +16,8 @@ from parameterize.files import save_arrays
 from parameterize.spline.body import BodyLike
 from parameterize.threads import one_blas_thread
 
+from .answer import Answer
+from .ask import Ask, asks_of
 from .diagnostics import TOO_STIFF, ConvergenceError, bending_notices
 from .discretization.grading import Grading
 from .field import BodyField
@@ -55,6 +57,8 @@ class Modes(Brief):
         modes are sought: six for each part of an elastic body that nothing holds, fewer with supports.
     notices : tuple of str
         Why the frequencies are doubtful, where they are.
+    answers : tuple of Answer
+        The asked frequencies, in the order of the asks.
 
     Examples
     --------
@@ -72,10 +76,12 @@ class Modes(Brief):
     iterations: int
     rigid: int = 0
     notices: tuple[str, ...] = ()
+    answers: tuple[Answer, ...] = ()
 
     def as_dict(self) -> dict[str, Any]:
         """Return the numbers of the modes for report.json."""
-        return {
+        asked = {"asked": [answer.as_dict() for answer in self.answers]} if self.answers else {}
+        return asked | {
             "frequencies": self.frequencies,
             "residuals": self.residuals,
             "iterations": self.iterations,
@@ -110,6 +116,7 @@ def modes(
     quadrature: str = SolveOptions.quadrature,
     tolerance: float = 1e-4,
     max_iterations: int = 200,
+    ask: Any = (),
 ) -> Modes:
     """Return the lowest modes of a body: K phi = omega^2 M phi, K the stiffness of a law and M the mass.
 
@@ -133,6 +140,8 @@ def modes(
         square is about the relative error of a frequency.
     max_iterations : int
         Largest number of iterations of LOBPCG.
+    ask : Ask or str, or a list of these
+        Frequencies to answer, such as "frequency 1".
 
     Returns
     -------
@@ -155,6 +164,8 @@ def modes(
     (6, 4)
     """
     check_modes(density, n, tolerance, max_iterations)
+    asks = asks_of(ask)
+    demand_frequencies(asks, n)
     if not law.form.linear:
         raise ValueError(f"{type(law.form).__name__} is not linear: it has modes about a state only, and no others")
     if not law.form.symmetric:
@@ -183,9 +194,19 @@ def modes(
         notices = (*notices, f"loads do not matter to vibrations: {', '.join(law.loads)}")
     for notice in notices:
         log.warning("%s", notice)
-    omega = np.sqrt(found.values / largest)
+    frequencies = np.sqrt(found.values / largest) / (2.0 * math.pi)
+    answers = tuple(Answer(one.text, float(frequencies[one.number - 1]), dimension="frequency") for one in asks)
     shapes = tuple(system.field(_upright(x) / math.sqrt(largest)) for x in found.vectors.T)
-    return Modes(omega / (2.0 * math.pi), shapes, found.residuals, found.iterations, rigid, notices)
+    return Modes(frequencies, shapes, found.residuals, found.iterations, rigid, notices, answers)
+
+
+def demand_frequencies(asks: Sequence[Ask], n: int) -> None:
+    """Raise ValueError for asks of anything but the frequency of one of n modes."""
+    for ask in asks:
+        if ask.kind != "frequency":
+            raise ValueError(f"{ask.role}: of modes only frequencies are asked, as in 'frequency 1'")
+        if ask.number > n:
+            raise ValueError(f"{ask.role}: {n} modes are sought; raise the number of modes")
 
 
 def check_modes(

@@ -17,7 +17,7 @@ from iga_nn.options import (
 from solve.study import benchmark_volume
 
 NOT_TOLD = {"unit", "stress_unit", "solve_anyway"}  # but to the reader, and to the run
-SPACE = {"refine": (2,), "degree": 2, "quadrature": "gauss"}
+SPACE = {"refine": (2,), "degree": 2, "quadrature": "gauss", "ask": ("energy",)}
 SCALAR = dict.fromkeys(("exact", "source", "boundary", "kappa", "reaction"), "1")
 VECTOR = dict.fromkeys(("exact", "body_force", "displacement"), "1;1;1")
 OTHERS = {

@@ -102,6 +102,7 @@ def test_what_is_done_is_shown_and_a_resumed_run_goes_on(
 def test_an_elastic_body_keeps_the_areas_of_its_regions(ending, in_folder, few_distances, coarse_regions):
     body_of_planes("L.obj")
     run = ["run", "elasticity", "L.obj", *FEWER, "--fix", "z < 1e-6", "--load", "nz > 0.9=0;0;-1"]
+    run += ["--ask", "uz min", "reaction z of z < 1e-6"]
     assert main([*run, "--out", "whole"]) == 0
     for at, code in ((1, 130), (1, 130), (None, 0)):  # interrupted again right after it goes on
         ending(KeyboardInterrupt() if at else None, at)
@@ -111,6 +112,8 @@ def test_an_elastic_body_keeps_the_areas_of_its_regions(ending, in_folder, few_d
             areas = [region["area"] for region in report_of("out")["elasticity"]["regions"]]
             assert areas == pytest.approx([5.0, 5.0], rel=1e-2)
     assert numbers(report_of("out")["elasticity"]) == numbers(report_of("whole")["elasticity"])
+    asked = report_of("out")["elasticity"]["asked"]
+    assert [answer["ask"] for answer in asked] == run[-2:] and asked[1]["value"] == pytest.approx(5.0, rel=1e-2)
 
 
 def test_levels_of_another_problem_are_solved_anew(formula_training, ending, in_folder, capsys):

@@ -7,7 +7,7 @@ from parameterize.arrays import listed
 
 from ..batch.table import Batch
 from ..level_table import ESTIMATES, EXACT_ERRORS, TITLES
-from ..report import advice, balance, extremes
+from ..report import advice, asked, balance, extremes
 from ..report import document as reports
 from ..report.artifacts import PAGE
 from ..rounding import rounded
@@ -42,7 +42,9 @@ def verdict_in_words(outcome: Outcome) -> str:
     """
     verdict = reports.verdict(outcome.report, outcome.folder)
     far, unsolved = reports.not_the_part(outcome.report), outcome.report.get("not_solved")
-    lines = [f"NOT THE PART     {far}"] if far else []
+    found = asked.lines(outcome.report)
+    lines = [f"{first:16s} {line}" for first, line in zip_longest(["asked"][: len(found)], found, fillvalue="")]
+    lines += [f"NOT THE PART     {far}"] if far else []
     lines += [f"NOT SOLVED       {unsolved}"] if unsolved else []
     measured = verdict.get("arap", {})
     if "patches" in outcome.report["parameterization"]:  # each against its own box: the unit changes nothing

@@ -38,7 +38,8 @@ def with_values(argv: Sequence[str]) -> list[str]:
     return words
 
 
-OF_STUDY = ("refine", "degree", "quadrature", *UNITS)  # options of a problem that a study has of its own, or fixes
+# Options of a problem that a study has of its own, or lacks.
+OF_STUDY = ("refine", "degree", "quadrature", "ask", *UNITS)
 
 
 def for_each_problem(group: App, *, is_default: bool = False, hidden: Sequence[str] = ()) -> Callable[[Any], Any]:

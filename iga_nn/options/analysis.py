@@ -11,7 +11,7 @@ from .problem import modulus
 from .space_check import check_level, check_space
 
 if TYPE_CHECKING:
-    from solve import Elasticity
+    from solve import Ask, Elasticity
 
 
 @dataclass(frozen=True)
@@ -52,6 +52,7 @@ class ModesOptions(Checked):
         refine: number of times that every knot span of the map is halved.
         degree: degree of the trial space; the degree of the map by default.
         solve_anyway: solve also on a map that folds, or that is too far from its surface to stand for the part.
+        ask: frequencies to answer with intervals, each as "frequency 1".
     """
 
     young: float | str = 1.0
@@ -63,6 +64,17 @@ class ModesOptions(Checked):
     refine: int = 0
     degree: int | None = None
     solve_anyway: bool = False
+    ask: tuple[str, ...] = ()
+
+    def asks(self) -> tuple[Ask, ...]:
+        """Return the asks. Raises InputError for one that is refused or asks for no frequency."""
+        from solve.ask import asks_of
+        from solve.modes import demand_frequencies
+
+        with input_errors():
+            found = asks_of(self.ask)
+            demand_frequencies(found, self.number)
+        return found
 
     @property
     def densities(self) -> Any:
@@ -76,6 +88,7 @@ class ModesOptions(Checked):
         from solve.modes import check_modes
 
         check_space([self.refine], self.degree)
+        self.asks()
         free = {} if self.fix or self.roller else dict.fromkeys(FACE_NAMES, ["0"] * 3)
         with input_errors():
             check_modes(self.densities, self.number)

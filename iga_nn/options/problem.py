@@ -14,7 +14,7 @@ from . import texts
 from .space_check import check_space
 
 if TYPE_CHECKING:
-    from solve import Elasticity, Poisson, SolveOptions
+    from solve import Ask, Elasticity, Poisson, SolveOptions
     from solve.forms.boundary_value_problem import BoundaryValueProblem
     from solve.forms.conditions import Condition
 
@@ -66,6 +66,9 @@ class ProblemOptions(Checked, ABC):
             span; "spline", the fewest points with the same error as "gauss+1".
         solve_anyway: solve also on a map that folds, or that is too far from its surface to stand for the part.
         unit: unit of lengths, such as mm; free text that is shown behind lengths and places and changes no number.
+        ask: quantities to answer with intervals, which reports show first, each as "ux at (10, 0, 0)", "von_mises max
+            over REGION", "mean T over REGION", "integral u", "reaction z of REGION", "flow over REGION" or "energy". A
+            region that is a condition on position alone is a part of the body, any other a part of its boundary.
     """
 
     exact: Formula | None = None
@@ -75,6 +78,7 @@ class ProblemOptions(Checked, ABC):
     quadrature: Literal["spline", "gauss", "gauss+1"] = "spline"
     solve_anyway: bool = False
     unit: str | None = None
+    ask: tuple[str, ...] = ()
 
     section: ClassVar[str]  # its name on the command line and in report.json
     title: ClassVar[str]
@@ -100,7 +104,18 @@ class ProblemOptions(Checked, ABC):
     def on_regions(cls) -> list[str]:
         """Return the names of the options that list regions with their data."""
         lists = (field.name for field in fields(cls) if field.type == "tuple[str, ...]")
-        return [name for name in lists if name not in cls.on_faces]
+        return [name for name in lists if name not in (*cls.on_faces, "ask")]
+
+    def asks(self, problem: BoundaryValueProblem) -> tuple[Ask, ...]:
+        """Return the asks of a problem. Raises InputError for one that is refused or does not fit the law."""
+        from solve.ask import asks_of
+        from solve.asked.named import demand_fit
+
+        with input_errors():
+            found = asks_of(self.ask)
+            for one in found:
+                demand_fit(one, problem)
+        return found
 
     def conditions(self, components: int) -> list[Condition]:
         """Return the conditions on regions, of a problem with c components of u. Raises InputError."""
@@ -132,10 +147,14 @@ class ProblemOptions(Checked, ABC):
         return NO_UNITS
 
     def solve_options(self) -> SolveOptions:
-        """Return the options of the solve on the finest mesh."""
+        """Return the options of the solve on the finest mesh. Raises InputError for an ask that is refused."""
         from solve import SolveOptions
+        from solve.ask import asks_of
 
-        return SolveOptions(refine=max(self.refine), degree=self.degree, quadrature=self.quadrature)
+        with input_errors():
+            return SolveOptions(
+                refine=max(self.refine), degree=self.degree, quadrature=self.quadrature, ask=asks_of(self.ask)
+            )
 
 
 @dataclass(frozen=True)
@@ -219,7 +238,7 @@ class PoissonOptions(ProblemOptions):
                 raise InputError(f"robin {face}: write {face}=ALPHA or {face}=ALPHA:FORMULA")
             robin[face] = (alpha, g if colon else None)
         with input_errors():
-            return Poisson(
+            problem = Poisson(
                 exact=self.exact,
                 source=_by_patch("--source", self.source, str),
                 boundary=self.boundary,
@@ -229,6 +248,8 @@ class PoissonOptions(ProblemOptions):
                 robin=robin,
                 conditions=self.conditions(1),
             )
+        self.asks(problem)
+        return problem
 
 
 def _entries(text: str) -> list[str]:
@@ -356,7 +377,7 @@ class ElasticityOptions(ProblemOptions):
 
         traction = texts.faces("traction", self.traction)
         with input_errors():
-            return Elasticity(
+            body = Elasticity(
                 exact=texts.vector("--exact", self.exact),
                 body_force=_by_patch("--body-force", self.body_force, partial(texts.vector, "--body-force")),
                 displacement=texts.vector("--displacement", self.displacement),
@@ -365,6 +386,8 @@ class ElasticityOptions(ProblemOptions):
                 poisson_ratio=modulus("--poisson-ratio", self.poisson_ratio),
                 conditions=self.conditions(3),
             )
+        self.asks(body)
+        return body
 
 
 def modulus(flag: str, given: float | str) -> Any:

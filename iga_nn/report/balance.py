@@ -25,7 +25,7 @@ def table(section: dict[str, Any]) -> list[list[str]]:
     level = _finest(section)
     if not level.get("reactions"):
         return []
-    unit = _behind(section)
+    unit = unit_of(section)
     head = [f"{axis}{unit and f' [{unit}]'}" for axis in AXES] if _is_force(section) else ["inflow"]
     rows = [("load", level["load"]), *level["reactions"].items()]
     shown = [["", *head], *([capitalized(role), *_numbers(values, level)] for role, values in rows)]
@@ -39,7 +39,7 @@ def lines(section: dict[str, Any]) -> list[str]:
     level = _finest(section)
     if not level.get("reactions"):
         return []
-    unit = _behind(section)
+    unit = unit_of(section)
     rows = [("load", level["load"]), *((f"{role} answers", force) for role, force in level["reactions"].items())]
     return [f"{said} {_vector(_numbers(values, level))}{unit and f' {unit}'}" for said, values in rows]
 
@@ -53,7 +53,7 @@ def _is_force(section: dict[str, Any]) -> bool:
     return len(_finest(section).get("load", ())) == len(AXES)
 
 
-def _behind(section: dict[str, Any]) -> str:
+def unit_of(section: dict[str, Any]) -> str:
     """Return the unit of forces, where the units of stresses and of lengths are known."""
     stress, length = section.get("stress_unit"), section.get("unit")
     if (stress, length) in NEWTON:

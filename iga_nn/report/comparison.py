@@ -10,8 +10,8 @@ from ..errors import InputError
 from ..level_table import TITLES, number
 from ..rounding import rounded
 from ..version import __version__
+from . import asked, extremes, html
 from . import document as reports
-from . import extremes, html
 
 Cell = tuple[float | None, str]  # the number, None for a text, and its text
 
@@ -39,6 +39,7 @@ class Run:
         section = reports.solved(self.report)
         finest = section["levels"][-1] if section.get("levels") else {}
         return {
+            "Asked quantities": asked.cells(self.report),
             "The map": _of_map(self.report),
             "The finest solve": {
                 _titled(key, section): (float(finest[key]), number(key, finest[key]))

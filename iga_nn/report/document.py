@@ -201,6 +201,11 @@ def solved(report: Report) -> Report:
     return next((report[name] for name in SOLVED if name in report), {})
 
 
+def asked(report: Report) -> list[Report]:
+    """Return the answers to the asks of a run, those of its finest level; none where nothing was asked."""
+    return next((section["asked"] for section in (solved(report), report.get("modes", {})) if "asked" in section), [])
+
+
 def one_to_one(report: Report) -> str:
     """Return whether the map is one-to-one: "yes", "no" or "undecided".
 
@@ -273,6 +278,8 @@ def verdict(report: Report, folder: Path) -> Report:
     short |= defects | {name: report[name] for name in ("advice", "not_drawn") if name in report}
     if refinement := quality.get("refinement"):
         short["refinement"] = refinement
+    if found := asked(report):
+        short["asked"] = found
     if section := solved(report):
         keys = ("dofs", *EXACT_ERRORS, *ESTIMATES, "iterations", "converged", "meaningful", "singular", "extremes")
         short["levels"] = [{key: level[key] for key in keys if key in level} for level in section["levels"]]

@@ -96,7 +96,7 @@ def _growth(known: Sequence[Level], section: dict[str, Any]) -> list[str]:
         before, now = (level["extremes"][name]["largest"] for level in (coarse, fine))
         if before > 0.0 and now > before * GROWTH ** math.log2(coarse["h"] / fine["h"]):
             grew = f"grew from {before:.4g} to {now:.4g}{_behind(section.get(SAYINGS[name][2]))}"
-            where = _place(fine["extremes"][name]["largest_at"], section)
+            where = place_of(fine["extremes"][name]["largest_at"], section)
             return [
                 f"the largest {title} {grew} under the last refinement, at {where}: the mesh does not resolve it, or "
                 "it is infinite there, as at an edge that the spline rounds off; one more --refine tells"
@@ -108,7 +108,7 @@ def _of_one_level(known: Sequence[Level], section: dict[str, Any]) -> list[str]:
     """Return the notice on the largest stress where it is known on one level alone, or not at all."""
     if not known or STRESS not in known[-1]["extremes"]:
         return []
-    where = _place(known[-1]["extremes"][STRESS]["largest_at"], section)
+    where = place_of(known[-1]["extremes"][STRESS]["largest_at"], section)
     return [
         f"the largest {DERIVATIVES[STRESS]}, at {where}, is known on one level alone: at a clamped rim or a re-entrant "
         "edge it is infinite, and the number is no result; --refine 0 1 tells whether it grows"
@@ -128,7 +128,7 @@ def _where_infinite(section: dict[str, Any]) -> str:
 
 def _at(extreme: dict[str, Any], end: str, section: dict[str, Any]) -> str:
     """Return the place of an extreme as text, and how far it is from where the stress is infinite."""
-    at = _place(extreme[f"{end}_at"], section)
+    at = place_of(extreme[f"{end}_at"], section)
     if (spans := extreme.get("spans")) is None:
         return at
     if not spans:
@@ -137,7 +137,7 @@ def _at(extreme: dict[str, Any], end: str, section: dict[str, Any]) -> str:
     return f"{at}, farther than {spans:g} span{'' if spans == 1.0 else 's'} ({radius}) from there"
 
 
-def _place(point: Sequence[float], section: dict[str, Any]) -> str:
+def place_of(point: Sequence[float], section: dict[str, Any]) -> str:
     """Return a point as text: "(12.5, 0, 3.1) mm"."""
     least = TINY * max(map(abs, point))
     coordinates = ", ".join(f"{x if abs(x) > least else 0.0:.4g}" for x in point)

@@ -19,7 +19,7 @@ from parameterize.old_names import ORIGINS
 from ..errors import one_line
 from ..level_table import TITLES, as_rows, capitalized
 from ..rounding import rounded
-from . import balance, extremes
+from . import asked, balance, extremes
 from . import document as reports
 from .advice import in_words
 from .artifacts import PAGE, REGIONS, SOLVED, figures_of
@@ -73,6 +73,7 @@ def page(report: Report, scene: dict[str, Any] | None, folder: Path) -> str:
         title=f"{Path(report['input']['file']).name}: {what}",
         report=report,
         verdicts=verdicts(report),
+        asked=asked.facts(report),
         facts=_facts(report),
         scene=scene,
         advice=in_words(report),

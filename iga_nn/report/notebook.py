@@ -19,6 +19,7 @@ from solve.solution import Solution
 from solve.study import Convergence
 
 from ..level_table import as_rows
+from . import asked
 from . import document as reports
 from .html import filled
 
@@ -136,7 +137,9 @@ def _solution(solution: Solution) -> str:
     report = solution.report
     head, *rows = as_rows([report.as_dict()])
     title = "Solution" if report.converged else f"Solution, NOT CONVERGED (residual {report.residual:.1e})"
-    return _table(title, rows, head, notices=report.notices)
+    answers = [answer.as_dict() for answer in solution.answers]
+    found = _table("Asked quantities", asked.rows({"asked": answers}), asked.HEAD) if answers else ""
+    return found + _table(title, rows, head, notices=report.notices)
 
 
 @as_html.register

@@ -20,7 +20,8 @@ from parameterize.progress import ProgressCallback
 from parameterize.spline.body import BodyLike, as_body
 from parameterize.spline.volume import BSplineVolume
 from parameterize.threads import default_threads
-from solve import ConvergenceRow, Solution, check_device, check_problem, convergence, modes
+from solve import ConvergenceRow, Solution, SolveOptions, check_device, check_problem, convergence, modes
+from solve.asked.functional import functional
 from solve.discretization.processes import agreed
 from solve.forms.boundary_value_problem import BoundaryValueProblem
 from solve.study import with_rates
@@ -39,8 +40,8 @@ from ..options import (
     Units,
     check_size,
 )
+from ..report import asked, html
 from ..report import document as reports
-from ..report import html
 from ..type_check import check_type
 from .command_line import command_line
 from .cost_estimate import tell_memory
@@ -48,6 +49,7 @@ from .levels import KeptLevels
 from .mapping import MapInput, kept_map, map_surface, read_input
 from .output_folder import CHECKPOINT, Outcome, RunFolder, changed_file, default_folder, open_folder
 from .painter import Painter
+from .regions import check_asks
 from .solving import (
     described,
     each_level,
@@ -164,15 +166,21 @@ def parameterize_to(
             return _finished_by(identity, state.finished, vector, problem_options)
         known = {"command": _command(mesh, out, mapping, problem_options), "identity": identity}
         body = kept_map(state, given, known, problem) if mapping.resume else None
+        options = None if problem_options is None else problem_options.solve_options()
         if body is None:
+            if options is not None:
+                with input_errors():
+                    check_asks(options.ask, given.surface)
             body = map_surface(state, given, mapping, progress, known, problem, unknowns).volume
-        if problem_options is None or problem is None or stays_unsolved(state, problem_options.solve_anyway):
+        if problem_options is None or problem is None or options is None:
             return _finish(state, body)
-        problem = with_part(problem, state.folder / "volume.npz")
+        if stays_unsolved(state, problem_options.solve_anyway):
+            return _finish(state, body)
+        problem, options = with_part(problem, options, state.folder / "volume.npz")
         kept = KeptLevels(
             state.folder, Checkpoints(state.folder / CHECKPOINT, given.identity, resume=True), problem_options
         )
-        solution = solve_levels(state, body, problem, problem_options, problem_options.solve_options(), kept)
+        solution = solve_levels(state, body, problem, problem_options, options, kept)
         return _finish(state, body, solution, problem, problem_options.units)
 
 
@@ -238,8 +246,8 @@ def solve_to(
     problem_options, path = problem_options or PoissonOptions(), Path(volume)
     if comm is not None and device != "cpu":
         raise InputError(f"device {device!r}: --mpi runs on the CPU; leave one of them out")
-    problem = with_part(problem_options.problem(), path)
-    loaded, options = load_volume(path), replace(problem_options.solve_options(), device=device, comm=comm)
+    problem, options = with_part(problem_options.problem(), problem_options.solve_options(), path)
+    loaded, options = load_volume(path), replace(options, device=device, comm=comm)
     processes = 1 if comm is None else comm.size
     if comm is not None and processes == 1:
         log.warning("--mpi in a single process: `mpiexec -n 4 iga-nn solve ... --mpi` takes four")
@@ -247,6 +255,8 @@ def solve_to(
     with input_errors():
         check_problem(loaded, problem, comm)
         check_device(device, problem)
+        for ask in options.ask:
+            functional(ask, problem, loaded)
     tell_memory(loaded, problem, options)
     how: dict[str, Any] = {"device": device} if device != "cpu" else {"mpi": True} if comm is not None else {}
     command = command_line(f"solve {problem_options.section}", path, problem_options, **how, out=out)
@@ -268,20 +278,24 @@ def solve_to(
         return _finish(state, loaded, solution, problem, problem_options.units)
 
 
-def with_part(problem: BoundaryValueProblem, volume: Path) -> BoundaryValueProblem:
-    """Return a problem whose regions know the original surface of a volume, from the boundary.npz beside the volume.
+def with_part(
+    problem: BoundaryValueProblem, options: SolveOptions, volume: Path
+) -> tuple[BoundaryValueProblem, SolveOptions]:
+    """Return a problem and options whose regions know the original surface of a volume: boundary.npz, which is beside.
 
     Raises InputError where regions name faces or groups of that surface, and the file does not exist.
     """
     beside = volume.with_name("boundary.npz")
-    if not problem.conditions or not (problem.needs_surface or beside.is_file()):
-        return problem
+    is_needed = problem.needs_surface or any(ask.region is not None and ask.region.needs_surface for ask in options.ask)
+    if not (problem.conditions or options.ask) or not (is_needed or beside.is_file()):
+        return problem, options
     from parameterize.cube.boundary_map import read_part
 
     if not beside.is_file():
         raise InputError(f"{beside}: is not there, and without it group:NAME and face(x, y, z) mean nothing")
     with input_errors():
-        return problem.on_surface(read_part(beside))
+        part = read_part(beside)
+        return problem.on_surface(part), replace(options, ask=tuple(ask.placed(surface=part) for ask in options.ask))
 
 
 def study_to(
@@ -366,7 +380,8 @@ def modes_to(
     """
     check_type("volume", volume, str | Path)
     modes_options, path = modes_options or ModesOptions(), Path(volume)
-    body, loaded = with_part(modes_options.problem(), path), load_volume(path)
+    body, _ = with_part(modes_options.problem(), SolveOptions(), path)
+    asks, loaded = modes_options.asks(), load_volume(path)
     check_size(loaded, modes_options.refine, modes_options.degree, body.form.components)
     with open_folder(path, f"{default_folder(path)}-modes" if out is None else out, force, vector=vector) as state:
         state.begin("modes")
@@ -381,11 +396,13 @@ def modes_to(
                 modes_options.number,
                 refine=modes_options.refine,
                 degree=modes_options.degree,
+                ask=asks,
             )
         found.save(state.folder / "modes.npz")
         state.write(modes=asdict(modes_options) | found.as_dict())
         state.draw("modes", volume=loaded, modes=found)
-        return _finish(state, loaded, scene=moving_scene_of(state, loaded, found)), str(found)
+        table = "\n".join([*asked.lines(state.report), str(found)])
+        return _finish(state, loaded, scene=moving_scene_of(state, loaded, found)), table
 
 
 def _finished_by(

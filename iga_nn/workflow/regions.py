@@ -8,7 +8,10 @@ import numpy as np
 
 from parameterize.arrays import Array, IntArray
 from parameterize.surface.geometry import normals_and_areas
+from parameterize.surface.solid import Solid
 from parameterize.surface.surface import Surface
+from solve.ask import Ask
+from solve.asked.functional import NEAR
 from solve.forms.boundary_value_problem import BoundaryValueProblem
 from solve.forms.frame import UnitFrame
 from solve.forms.region import Region
@@ -18,6 +21,7 @@ from ..new_file import check_new
 
 _SAMPLES = 20_000  # points of the surface, beside its vertices
 _SEED = 0
+_LATTICE = 40  # points a direction of the box, in which a part of the body is looked for
 
 
 def check_regions(problem: BoundaryValueProblem, surface: Surface) -> None:
@@ -28,6 +32,33 @@ def check_regions(problem: BoundaryValueProblem, surface: Surface) -> None:
     for condition in problem.conditions:
         if not condition.region.needs_cube and not share_of(condition.region, surface):
             raise ValueError(f"{condition.role}: {_nowhere(surface)}")
+
+
+def check_asks(asks: Sequence[Ask], surface: Surface) -> None:
+    """Raise ValueError for asks that the part cannot have: a place outside of it, or a region without a point of it.
+
+    Regions of the cube's faces are unknown before the map exists.
+    """
+    solid = Solid(surface.vertices, surface.faces)
+    for one in asks:
+        ask = one.placed(frame_of(surface), surface.part)
+        if ask.place is not None:
+            distance = float(solid.signed_distances(np.array([ask.place]))[0])
+            if distance > NEAR * float(np.ptp(surface.vertices, axis=0).max()):
+                raise ValueError(f"{ask.role}: the place lies outside of the part, {distance:.4g} from its surface")
+        region = ask.region
+        if region is None or region.needs_cube or region.patch_faces:
+            continue
+        on_boundary = ask.is_on_boundary or ask.kind in ("reaction", "flow")
+        if not share_of(region, surface) and (on_boundary or not _holds_inside(region, surface)):
+            raise ValueError(f"{ask.role}: {_nowhere(surface)}")
+
+
+def _holds_inside(region: Region, surface: Surface) -> bool:
+    """Return whether a condition on the position holds at points of a lattice in the surface's box."""
+    rows = np.linspace(*surface.bbox, _LATTICE)
+    points = np.stack(np.meshgrid(*rows.T, indexing="ij")).reshape(3, -1)
+    return bool(region.holds(points, np.zeros_like(points)).any())
 
 
 def _nowhere(surface: Surface) -> str:

@@ -72,8 +72,10 @@ def section_of(
     """Return the section of report.json on a problem and the levels that are done."""
     known = problem_options.values("refine", "degree") | described(problem, body)
     notices = [*notices_of(done.reports), *_peaks(problem_options, problem, done)]
+    asked = [answer.as_dict() for answer in done.reports[-1].asked]
     return (
-        {name: value for name, value in known.items() if value is not None and value != ()}
+        ({"asked": asked} if asked else {})
+        | {name: value for name, value in known.items() if value is not None and value != ()}
         | ({"regions": regions_of(problem, done.reports[-1])} if problem.conditions else {})
         | {"levels": done.entries, "rates": rates(done.reports), "notices": notices}
     )
