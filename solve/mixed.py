@@ -94,11 +94,17 @@ class MixedSystem(System):
         patches = zip(found.patches, full, strict=True)
         return replace(found, patches=tuple(replace(patch, pressure=own[3]) for patch, own in patches))
 
-    def _iterate(self, options: IterationOptions) -> LinearResult:
-        guess = None if options.start is None else self._halves(self.vector(options.start))
+    def _iterate(self, options: IterationOptions, guess: Array | None = None) -> LinearResult:
+        if options.start is not None:
+            guess = self.vector(options.start)
         limits = options.tolerance, options.max_iterations
-        found = saddle_point(self.saddle, self._halves(self.right), *limits, guess)
+        start = None if guess is None else self._halves(guess)
+        found = saddle_point(self.saddle, self._halves(self.right), *limits, start)
         return replace(found, x=_vector(found.x))
+
+    def _size(self, x: Array) -> float:
+        right = self._halves(self.right)
+        return self.saddle.size(right)(self._halves(self.right - self.product(x)))
 
     def _parts(self, full: Sequence[Array]) -> list[Compared]:
         return super()._parts([own[:3] for own in full])

@@ -2,6 +2,7 @@
 
 import functools
 import logging
+import math
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -43,6 +44,7 @@ from .patch_system import PatchProblem, PatchSystem, operators_of, systems_of
 from .reactions import Balance, balance
 from .solution import Solution, SolveReport
 
+LARGEST_TOLERANCE = 0.5  # of an iteration that continues
 LARGEST_VALUE = 1e150  # of a solution: the squares of larger ones overflow
 
 log = logging.getLogger(__name__)
@@ -233,10 +235,7 @@ class System:
             raise ConvergenceError(failed)
         steps = result.iterations + (options.start is not None)  # products made
         traffic = {kind: (count - sent.get(kind, 0)) / steps for kind, count in processes.traffic().items() if steps}
-        full = self._filled(result.x)
-        if self.is_open:
-            mean = missing_mean(self._parts(full), processes)
-            full = [part + mean for part in full]
+        full = self._completed(result.x)
         clock.append(time.process_time())
         largest = max(processes.shared(max(float(np.abs(part).max(initial=0.0)) for part in full)))
         has_norm = largest <= LARGEST_VALUE
@@ -272,8 +271,49 @@ class System:
             balance=self._balance(full) if has_norm else None,
             formulation=self.formulation,
         )
-        problems = [patch.problem for patch in self.stated]
-        return Solution.of(self._field(full), problems, report, problem)
+        return self._solution(full, report)
+
+    def continued(self, start: Array, share: float, options: IterationOptions) -> Solution:
+        """Return the solution from the free coefficients `start` (N,), whose residual falls to a share of its own.
+
+        The report has no errors and no notices. The tolerance of the options is the least residual.
+        """
+        clock, guess = time.process_time(), start.reshape(self.right.shape)
+        with one_blas_thread():
+            tolerance = float(np.clip(share * self._size(guess), options.tolerance, LARGEST_TOLERANCE))
+            result = self._iterate(replace(options, tolerance=tolerance, start=None), guess)
+            full = self._completed(result.x)
+            spaces = [patch.space for patch in self.patches]
+            report = SolveReport(
+                elements=sum(patch.space.elements for patch in self.stated),
+                dofs=self.problem.form.components * self.unknowns.count,
+                h=max(self.unknowns.processes.shared(longest_edges([own.volume for own in self.patches], spaces))),
+                iterations=result.iterations,
+                converged=result.converged,
+                residual=result.residuals[-1],
+                seconds={"setup": self.setup, "solve": time.process_time() - clock},
+                residuals=result.residuals,
+                balance=self._balance(full),
+                formulation=self.formulation,
+            )
+        return self._solution(full, report)
+
+    def _solution(self, full: Sequence[Array], report: SolveReport) -> Solution:
+        return Solution.of(self._field(full), [patch.problem for patch in self.stated], report, self.problem)
+
+    def _completed(self, free: Array) -> list[Array]:
+        """Return all coefficients of a solution (c, n_u, n_v, n_w) of each patch, where it is open with its mean."""
+        full = self._filled(free)
+        if not self.is_open:
+            return full
+        mean = missing_mean(self._parts(full), self.unknowns.processes)
+        return [part + mean for part in full]
+
+    def _size(self, x: Array) -> float:
+        """Return the residual of x (c, ...) over the right-hand side, as the iteration measures it."""
+        total = self.unknowns.processes.total
+        rest, size = (float(total(float(np.square(part).sum()))) for part in (self.right - self.product(x), self.right))
+        return math.sqrt(rest / size) if size > 0.0 else 0.0
 
     @property
     def _folded(self) -> Sequence[str]:
@@ -352,10 +392,14 @@ class System:
             return None
         return float(total((self.right * free).sum()))
 
-    def _iterate(self, options: IterationOptions) -> LinearResult:
-        """Return the result of conjugate gradients, or of GMRES where the law is not symmetric."""
+    def _iterate(self, options: IterationOptions, guess: Array | None = None) -> LinearResult:
+        """Return the result of conjugate gradients, or of GMRES where the law is not symmetric.
+
+        guess: where the iteration starts, (c, ...); by default at the start of the options.
+        """
         limits = options.tolerance, options.max_iterations
-        guess = None if options.start is None else self.vector(options.start).reshape(self.right.shape)
+        if options.start is not None:
+            guess = self.vector(options.start).reshape(self.right.shape)
         if options.device != "cpu":
             from .linear.cuda import solve_on_device
 
