@@ -7,6 +7,7 @@ from parameterize.old_names import takes_volume
 from parameterize.spline.body import BodyLike, as_body
 
 from .asked.functional import functional
+from .asked.interval import answers
 from .assembly import assemble_body_data, balanced
 from .discretization.grading import Grading
 from .discretization.on_regions import demand_area, demand_supports
@@ -107,10 +108,11 @@ def solve_with(body: BodyLike, problem: BoundaryValueProblem, options: SolveOpti
     """Return the solution of `solve_problem` for options in one object."""
     check_device(options.device, problem)
     functionals = [functional(ask, problem, body) for ask in options.ask]
-    solution = discretized(body, problem, options).solve_with(options)
+    system = discretized(body, problem, options)
+    solution = system.solve_with(options)
     if not functionals:
         return solution
-    found = tuple(one.answer(solution) for one in functionals)
+    found = answers(system, solution, functionals, options)
     return replace(solution, report=replace(solution.report, asked=found))
 
 

@@ -383,14 +383,19 @@ class System:
         for face in self.matrix.weak:
             yield face, self.patches[face.patches[0]].space, coefficients.of(face.patches)
 
-    def _energy(self, free: Array) -> float | None:
-        """Return a(u_h, u_h) of free coefficients that solve the system; None where it is not the work of the loads."""
+    @property
+    def has_given_values(self) -> bool:
+        """Return whether values other than zero are given somewhere."""
         given: Any = sum(np.count_nonzero(patch.known) for patch in self.patches)
         given += sum(np.count_nonzero(face.values) for face in self.matrix.weak)
-        total = self.unknowns.processes.total
-        if not self.problem.form.symmetric or total(given):
+        return bool(self.unknowns.processes.total(given))
+
+    def _energy(self, free: Array) -> float | None:
+        """Return a(u_h, u_h) of free coefficients that solve the system; None where it is not the work of the loads."""
+        has_given = self.has_given_values  # of all processes
+        if not self.problem.form.symmetric or has_given:
             return None
-        return float(total((self.right * free).sum()))
+        return float(self.unknowns.processes.total((self.right * free).sum()))
 
     def _iterate(self, options: IterationOptions, guess: Array | None = None) -> LinearResult:
         """Return the result of conjugate gradients, or of GMRES where the law is not symmetric.

@@ -2,8 +2,8 @@
 
 What the raised solution adds to a solution is its error, but for the error of the raised solution itself. That is
 smaller by an order where the solution is smooth. Singular places are at edges of patches as a rule: at reentrant edges,
-where materials meet, and around held faces. There the degree alone helps little. So spans at the ends of patches of
-several spans are divided in two, and the outer half again: the space stays small, and has a quarter of the span there.
+where materials meet, and around held faces. There the degree alone helps little: half of the error is missing. So spans
+at the ends of patches of several spans are divided in two, and the outer half again, where this costs little.
 """
 
 from collections import defaultdict
@@ -15,6 +15,7 @@ import numpy as np
 
 from parameterize.arrays import Array, Knots
 from parameterize.spline.bspline import collocation
+from parameterize.spline.volume import BSplineVolume
 
 from ..discretization.slab import shared_space
 from ..discretization.space import MOST_DEGREE, TrialSpace, of_each
@@ -22,24 +23,31 @@ from ..field import BodyField
 from ..linear.nodal import nodes
 from ..mixed import MixedSystem, build_mixed
 from ..options import SolveOptions
+from ..reactions import Balance
 from ..solution import Solution
 from ..system import System, build
 from .adjoint import adjoint
 from .samples import Samples
 
-LEFT = 0.01  # share of the residual that the iteration leaves: 1 % of what the raised solution adds, and less
+LEFT = 0.02  # share of the residual that the iteration leaves: some 2 % of what the raised solution adds
+LEFT_OF_GIVEN = 0.002  # where values are given: the start does not have those of the raised space
 ENDS = (0.25, 0.5)  # where a span at the end of a patch is divided
+AFFORDED = 1.5  # times as many coefficients as without divided ends
+FEW = 20_000  # coefficients of a component that are always afforded
+MOST = 5_000_000  # coefficients of all components
 
 
 @dataclass(frozen=True, eq=False)
 class Raised:
     """Hold the solution on the raised space.
 
-    system: that of the space. solution: with the balance of its loads, without errors and notices.
+    system: that of the space. solution: with the balance of its loads, without errors and notices. is_divided: whether
+    spans at the ends of patches are divided, so that it is better at singular places.
     """
 
     system: System
     solution: Solution
+    is_divided: bool
 
     @classmethod
     def of(cls, system: System, solution: Solution, options: SolveOptions) -> "Raised":
@@ -49,8 +57,12 @@ class Raised:
         """
         if why := why_not_raised(system):
             raise ValueError(f"there is no raised space: {why}")
-        higher = raised_system(system, options)
-        return cls(higher, higher.continued(start_in(higher, solution), LEFT, options))
+        is_divided = affords_ends(system)
+        higher = raised_system(system, options, is_divided)
+        left = LEFT_OF_GIVEN if system.has_given_values else LEFT
+        found = higher.continued(start_in(higher, solution), left, options)
+        report = replace(found.report, balance=evened(found.report.balance))
+        return cls(higher, replace(found, report=report), is_divided)
 
     def dual(self, samples: Samples) -> BodyField:
         """Return the adjoint of a functional in the raised space."""
@@ -61,41 +73,76 @@ def why_not_raised(system: System) -> str:
     """Return why a system has no raised space; "" where it has one."""
     if max(max(patch.space.degrees) for patch in system.stated) >= MOST_DEGREE:
         return f"degree {MOST_DEGREE} is the highest one"
-    return ""
+    count = system.problem.form.components * _count(system, is_divided=False)
+    return f"the raised space has {count:,} coefficients" if count > MOST else ""
 
 
-def raised_system(system: System, options: SolveOptions) -> System:
-    """Return the system of the same problem on the raised space."""
+def raised_system(system: System, options: SolveOptions, is_divided: bool) -> System:
+    """Return the system of the same problem on the raised space. is_divided: whether patches' ends are."""
     comm = options.comm if system.body.is_single else None
-    spaces = of_each(raised_space, [patch.space.whole for patch in system.stated])
-    patches = [
-        replace(patch, space=shared_space(space, comm)) for patch, space in zip(system.stated, spaces, strict=True)
-    ]
+    spaces = [shared_space(space, comm) for space in _raised_spaces(system, is_divided)]
+    patches = [replace(patch, space=space) for patch, space in zip(system.stated, spaces, strict=True)]
     make = build_mixed if isinstance(system, MixedSystem) else build
     return make(system.body, system.problem, patches, options)
 
 
-def raised_space(space: TrialSpace) -> TrialSpace:
-    """Return the space of one degree more on the same spans, with those at the ends of patches divided."""
-    u, v, w = (raised_knots(knots, degree) for knots, degree in zip(space.knots, space.degrees, strict=True))
+def _raised_spaces(system: System, is_divided: bool) -> list[TrialSpace]:
+    """Return the raised space of each patch; patches share theirs as they share their spaces."""
+    volumes = {id(patch.space): patch.volume for patch in system.stated}  # spaces are shared by maps of equal knots
+    return of_each(
+        lambda space: raised_space(space.whole, volumes[id(space)], is_divided),
+        [patch.space for patch in system.stated],
+    )
+
+
+def _count(system: System, is_divided: bool) -> int:
+    """Return the number of coefficients of all patches of a component in the raised space."""
+    return sum(space.dofs for space in _raised_spaces(system, is_divided))
+
+
+def affords_ends(system: System) -> bool:
+    """Return whether spans at the ends of patches are divided: where there are several, and it costs little."""
+    if all(len(row) == 2 for patch in system.stated for row in patch.space.whole.breaks):
+        return False
+    return _count(system, is_divided=True) <= max(FEW, AFFORDED * _count(system, is_divided=False))
+
+
+def raised_space(space: TrialSpace, volume: BSplineVolume, is_divided: bool) -> TrialSpace:
+    """Return the space of one degree more on the same spans. is_divided: whether those at the ends of patches are."""
+    own, maps = zip(space.knots, space.degrees, strict=True), zip(volume.knots, volume.degrees, strict=True)
+    u, v, w = (raised_knots(*row, *of_map, is_divided) for row, of_map in zip(own, maps, strict=True))
     p, q, r = space.degrees
     return replace(space, degrees=(p + 1, q + 1, r + 1), knots=(u, v, w))
 
 
-def raised_knots(knots: Array, degree: int) -> Array:
-    """Return the knot vector of one degree more.
+def raised_knots(knots: Array, degree: int, of_map: Array, map_degree: int, is_divided: bool) -> Array:
+    """Return the knot vector of one degree more, from that of a space and that of its map.
 
-    Simple knots stay simple, so that there are hardly more functions; knots of less smoothness keep it. On a single
-    span nothing is divided.
+    Where the map is smooth the space is smoother by one, so that there are hardly more functions. At the map's own
+    knots it is as smooth as the map: on one that is smoother errors are larger than before. A single span is not
+    divided.
     """
     values, repeats = np.unique(knots, return_counts=True)
-    repeats[(repeats > 1) | (degree == 1)] += 1
+    for value, repeat in zip(*np.unique(of_map, return_counts=True), strict=True):
+        repeats[values == value] = np.maximum(repeats[values == value], degree + 1 - map_degree + repeat)
+    repeats[[0, -1]] = degree + 2
     row = np.repeat(values, repeats)
-    if len(values) == 2:
+    if len(values) == 2 or not is_divided:
         return row
     first, last = values[1] - values[0], values[-1] - values[-2]
     ends = [(values[0] + share * first, values[-1] - share * last) for share in ENDS]
     return np.sort(np.append(row, ends))
+
+
+def evened(balance: Balance | None) -> Balance | None:
+    """Return the balance whose reactions have what the iteration leaves of the loads, each by its size."""
+    if balance is None or balance.imbalance is None or not balance.reactions:
+        return balance
+    forces = np.array(list(balance.reactions.values()))
+    sizes = np.abs(forces)
+    shares = np.divide(sizes, sizes.sum(axis=0), out=np.zeros_like(sizes), where=sizes.sum(axis=0) > 0.0)
+    forces = forces - shares * (np.array(balance.load) + forces.sum(axis=0))
+    return replace(balance, reactions=dict(zip(balance.reactions, map(tuple, forces.tolist()), strict=True)))
 
 
 def start_in(system: System, field: BodyField) -> Array:
@@ -126,8 +173,10 @@ def start_in(system: System, field: BodyField) -> Array:
 
 def _pressures(system: MixedSystem, coefficients: Sequence[Array]) -> Array:
     """Return the pressures nearest to coefficients (n_u, n_v, n_w) in the trial space of each patch."""
-    found, known = np.zeros(system.pressures.count), dict[int, Array]()
-    for own, extraction, numbers in zip(coefficients, system.pressures.of_patches, system.pressures.numbers, strict=True):
+    found, known = np.zeros(system.pressures.count), dict[int, Any]()
+    for own, extraction, numbers in zip(
+        coefficients, system.pressures.of_patches, system.pressures.numbers, strict=True
+    ):
         for part in extraction:
             if id(part) not in known:
                 known[id(part)] = np.linalg.pinv(part)

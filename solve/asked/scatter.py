@@ -1,4 +1,4 @@
-"""Measures how a linear functional of a difference scatters around its places: a difference may vanish there by chance."""
+"""Measures how a linear functional of a difference varies around its places: it may vanish there by chance."""
 
 from itertools import product
 
@@ -25,10 +25,8 @@ def scatter(samples: Samples, one: Solution, other: Solution) -> float:
     for number in np.unique(samples.patches).tolist():
         own = np.flatnonzero(samples.patches == number)
         places = _shifted(one.patches[number], samples.places[own])
-        differences = (
-            new - old for new, old in zip(_fields(other.patches[number], places), _fields(one.patches[number], places))
-        )
-        u, grad = (part.reshape(len(SHIFTS), len(own), *part.shape[1:]) for part in differences)
+        pairs = zip(_fields(one.patches[number], places), _fields(other.patches[number], places), strict=True)
+        u, grad = ((new - old).reshape(len(SHIFTS), len(own), *old.shape[1:]) for old, new in pairs)
         rows = len(samples.of_u)
         found += np.einsum("cm,smc->s", samples.of_u[:, own], u[..., :rows])
         found += np.einsum("cdm,smcd->s", samples.of_grad[:, :, own], grad)

@@ -1,0 +1,66 @@
+"""Answers what is asked of a solution, each quantity with the interval in which its true value is expected.
+
+The error of a quantity J is J(u+) - J(u_h), with the solution u+ on the raised space. For a linear J it is the residual
+of u_h at the adjoint of J in the raised space, the dual weighted residual (Becker, Rannacher, *Acta Numerica*, 2001).
+One solve serves all quantities, and those that are not linear. docs/solver.md says what the interval promises.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from ..answer import NOT_ESTIMATED, Answer
+from ..options import SolveOptions
+from ..solution import Solution
+from ..system import System
+from .functional import Functional, Reaction
+from .raised import Raised, why_not_raised
+from .scatter import scatter
+
+# Half of an interval over what the raised solution adds. In 568 quantities with a known value the interval then holds
+# it in 95 % (examples/benchmarks/effectivity.py); where ends of patches are not divided, a singular solution's error is
+# up to twice what is added.
+WIDER, WIDER_AT_ENDS = 1.5, 2.0
+BY_CHANCE = 0.4  # share of the error around a place that counts where the error happens to vanish at the place
+ITERATION = 0.1  # share of what the raised solution adds that its iteration leaves, at most
+
+
+def answers(
+    system: System, solution: Solution, functionals: Sequence[Functional], options: SolveOptions
+) -> tuple[Answer, ...]:
+    """Return the answers to what is asked of the solution of a system. options: those of the solve."""
+    if why := why_not_answered(system, solution):
+        return tuple(replace(one.answer(solution), why=f"{NOT_ESTIMATED}: {why}") for one in functionals)
+    raised = Raised.of(system, solution, options)
+    return tuple(answer(one, solution, raised) for one in functionals)
+
+
+def why_not_answered(system: System, solution: Solution) -> str:
+    """Return why the quantities of a solution have no interval; "" where they have one."""
+    return "the iteration did not converge" if not solution.report.converged else why_not_raised(system)
+
+
+def answer(asked: Functional, solution: Solution, raised: Raised) -> Answer:
+    """Return the answer to one quantity, with its interval from the raised solution."""
+    found = asked.answer(solution)
+    added = abs(asked.value(raised.solution) - found.value)
+    around = 0.0
+    if not isinstance(asked, Reaction) and (samples := asked.samples(solution)) is not None:
+        around = scatter(samples, solution, raised.solution)
+    wider = WIDER if raised.is_divided else WIDER_AT_ENDS
+    parts = {"discretization": wider * max(added, BY_CHANCE * around), "iteration": ITERATION * added}
+    return within(replace(found, why=_why(raised)), parts)
+
+
+def within(given: Answer, parts: dict[str, float]) -> Answer:
+    """Return an answer with more parts of its interval: half-widths by their source."""
+    every = dict(given.parts) | parts
+    half = sum(every.values())
+    return replace(given, lower=given.value - half, upper=given.value + half, parts=every)
+
+
+def _why(raised: Raised) -> str:
+    """Return in words what an interval rests on."""
+    degree = max(max(patch.space.degrees) for patch in raised.system.stated)
+    finer = " and finer at the ends of patches" if raised.is_divided else ""
+    wider = WIDER if raised.is_divided else WIDER_AT_ENDS
+    return f"{wider:g} times what a solution of degree {degree}{finer} adds"
