@@ -24,7 +24,11 @@ from .quantities import (
 )
 from .singular import SPANS, SingularPlaces
 
-_SHARES = (1.0, 0.5, 0.25)  # of SPANS: smaller radii where the whole of a coarse mesh lies within the first
+RADII = (
+    SPANS,
+    SPANS / 2.0,
+    SPANS / 4.0,
+)  # in spans: smaller ones where the whole of a coarse mesh lies within the first
 _BESIDE = 2.2  # times the radius: a mesh of spans twice as long left this out, up to its rounding
 
 
@@ -72,8 +76,8 @@ def _found(
 ) -> list[Extremes]:
     """Return the extremes outside of the largest radius that leaves something of the body."""
     quantities = [[quantity_of(form_of(group), what) for what in whats] for group in groups]
-    for share in _SHARES:
-        outside = _Outside(places, share * SPANS)
+    for spans in RADII:
+        outside = _Outside(places, spans)
         try:
             found = extremes_of(groups, quantities, per_span, outside)
         except ValueError:
@@ -81,8 +85,8 @@ def _found(
                 raise
             continue
         points = [one.largest_at for one in found]
-        beside = places.is_near(points, _BESIDE * outside.spans).tolist()
-        spans, radius = outside.spans, share * max(place.radius for place in places)
+        beside = places.is_near(points, _BESIDE * spans).tolist()
+        radius = spans / SPANS * max(place.radius for place in places)
         return [replace(o, spans=spans, radius=radius, beside=near) for o, near in zip(found, beside, strict=True)]
     return [replace(one, spans=0.0, beside=True) for one in extremes_of(groups, quantities, per_span)]
 

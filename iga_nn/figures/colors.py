@@ -4,7 +4,7 @@ Nothing here loads the figures of matplotlib, which take longer than a view is m
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from matplotlib import colormaps
@@ -57,13 +57,20 @@ def color_labels(body: BodyLike) -> list[tuple[str, str]]:
 class ColorRange:
     """Hold the limits of a colour scale.
 
-    remark: stands in place of ticks where the field has one value, such as "0 everywhere".
+    remark: stands in place of ticks where the field has one value, such as "0 everywhere". beyond: the largest value of
+    the field where it is higher than the range, as a stress near places where it is infinite; it has the last colour.
     """
 
     low: float
     high: float
     logarithmic: bool = False
     remark: str = ""
+    beyond: float | None = None
+
+    @property
+    def whole(self) -> "ColorRange":
+        """Return the range up to the largest value of the field."""
+        return self if self.beyond is None else replace(self, high=self.beyond, beyond=None)
 
     def norm(self) -> Normalize:
         """Return the range as a new object of matplotlib, which maps values to 0..1; colour bars change theirs."""
@@ -90,6 +97,19 @@ def even_range(values: Sequence[Array]) -> ColorRange:
     if high - low <= ROUNDING * size:
         return ColorRange(0.0, 1.0, remark=f"{high:.4g} everywhere")
     return ColorRange(low, high)
+
+
+def range_up_to(high: float, values: Sequence[Array]) -> ColorRange:
+    """Return the range from the lowest of all values to `high`, where some are higher and some lower."""
+    whole = even_range(values)
+    return replace(whole, high=high, beyond=whole.high) if not whole.remark and whole.low < high < whole.high else whole
+
+
+def joint_range(limits: Sequence[ColorRange], values: Sequence[Array]) -> ColorRange:
+    """Return one range of several fields with even ranges. values: those of all of them."""
+    if all(one.beyond is None for one in limits):
+        return even_range(values)
+    return range_up_to(max(one.high for one in limits if not one.remark), values)
 
 
 def error_range(meshes: Sequence[Sequence[Array]]) -> ColorRange:

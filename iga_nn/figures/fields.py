@@ -1,7 +1,8 @@
 """Samples bodies and their fields once for all pictures: on the faces, mid-sections and a lattice of each patch.
 
 Figures and the interactive view colour a field by one range, which counts every sample: on the boundary, on the
-mid-sections and inside. Whatever is drawn is among the samples, so no value that is drawn lies outside.
+mid-sections and inside. Whatever is drawn is among the samples, so no value that is drawn lies outside. Only a stress
+that is infinite somewhere is coloured by the range of its values elsewhere.
 
 Where something is listed for the faces and sections of all patches, each patch has nine entries: six faces, in the
 order of FACE_NAMES, three sections. Their number among those of all patches is their place: nine times the number of
@@ -10,7 +11,7 @@ the patch, and the number among the nine.
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache, partial, wraps
 from operator import itemgetter
 from typing import Any, Self, TypeVar
@@ -30,10 +31,12 @@ from solve.field_groups import FieldGroup, groups_of
 from solve.forms.boundary_value_problem import BoundaryValueProblem
 from solve.forms.form import Quantity
 from solve.forms.frame import UnitFrame
+from solve.outside import RADII
 from solve.quantities import group_values
+from solve.singular import SingularPlaces
 
 from ..options import Units
-from .colors import SMALLEST, ColorRange, error_range, even_range, with_unit
+from .colors import SMALLEST, ColorRange, error_range, even_range, range_up_to, with_unit
 
 Grid = tuple[Array, Array, Array]  # parameters of a tensor grid; on a face or a section one direction has one value
 OnGrid = Callable[[IntArray, Array, Array, Array], Array]  # takes some patches of a group and a tensor grid
@@ -338,8 +341,23 @@ def fields_of(solution: FieldOnBody) -> list[ColoredField]:
     laws = [group.problem.form.quantities.get("von_mises") for group in known_groups(solution) if group.problem]
     if laws and None not in laws:
         stress = quantity_of(solution, [law for law in laws if law], STRESS, "von Mises stress")
-        return fields if stress is None else [stress, *fields]
+        return fields if stress is None else [_ranging_outside(solution, stress), *fields]
     return fields
+
+
+def _ranging_outside(solution: FieldOnBody, field: ColoredField) -> ColoredField:
+    """Return a field of stresses with the range of those outside of singular places, as far as samples lie there."""
+    places: SingularPlaces = getattr(solution, "singular", SingularPlaces())
+    if not len(places):
+        return field
+    points = points_of(solution.on_body).everywhere
+    for spans in RADII:
+        outside = [~places.is_near(at.reshape(-1, 3), spans).reshape(at.shape[:-1]) for at in points]
+        rest = [values[mask] for values, mask in zip(field.everywhere, outside, strict=True) if mask.any()]
+        if rest:
+            high = max(float(values.max()) for values in rest)
+            return replace(field, limits=range_up_to(high, field.everywhere))
+    return field
 
 
 known_groups = remembered(groups_of)

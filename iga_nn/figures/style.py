@@ -122,10 +122,18 @@ def name_colors(figure: Figure, body: BodyLike) -> None:
     )
 
 
+BEYOND = "beyond the arrow: up to {:.3g} on this mesh, where it is infinite"
+
+
 def color_bar(figure: Figure, panels: Any, limits: ColorRange, title: str) -> None:
-    """Draw one colour bar to the right of all panels; for a field of one value it has one colour and says the value."""
+    """Draw one colour bar to the right of all panels; for a field of one value it has one colour and says the value.
+
+    An arrow and a line of text say that values beyond the range have the last colour.
+    """
     shades = ListedColormap([colormaps[MAP](0.5)]) if limits.remark else MAP
     extend = "min" if limits.logarithmic else "neither"  # smaller values have the lowest colour
+    if limits.beyond is not None:
+        extend, title = "max", f"{title}\n{BEYOND.format(limits.beyond)}"
     bar = figure.colorbar(ScalarMappable(limits.norm(), shades), ax=panels, shrink=0.85, aspect=28, extend=extend)
     if limits.remark:
         bar.set_ticks([0.5], labels=[limits.remark])

@@ -26,7 +26,7 @@ from solve.field import BodyField, FieldOnBody
 from solve.forms.boundary_value_problem import BoundaryValueProblem
 from solve.forms.form import Quantity
 
-from ..figures.colors import MAP, color_labels, even_range, face_colors, face_labels
+from ..figures.colors import MAP, color_labels, face_colors, face_labels, joint_range
 from ..figures.cutaway import WITH_OCTANTS, cut_of, seen_quarters
 from ..figures.fields import (
     PER_PATCH,
@@ -142,7 +142,7 @@ def scene_of_frames(
     if not names or any(other != names[0] for other in names):
         raise ValueError(f"frames must have the same fields, and there must be one at least, got {names}")
     limits = [
-        even_range([values for field in fields for values in field.everywhere])
+        joint_range([field.limits for field in fields], [values for field in fields for values in field.everywhere])
         for fields in zip(*(frame.fields for frame in frames), strict=True)
     ]
     alike = [
@@ -278,9 +278,9 @@ def _opening(frame: Frame, outer: IntArray) -> dict[str, str]:
 
 def _described(field: ColoredField, frame: Frame) -> dict[str, Any]:
     """Return the words of a field for the controls and the bar; the page computes its values from vectors if it can."""
-    limits = field.limits
+    limits = field.limits.whole
     described = {"name": field.name, "title": field.title, "low": limits.low, "high": limits.high}
-    described |= {"logarithmic": limits.logarithmic, "remark": limits.remark}
+    described |= {"logarithmic": limits.logarithmic, "remark": limits.remark, "shown": field.limits.high}
     return described | ({"component": COMPONENTS[field.name]} if _is_derived(field, frame) else {})
 
 
@@ -291,7 +291,9 @@ def _is_derived(field: ColoredField, frame: Frame) -> bool:
 def _values(frame: Frame, bound: float, drawn: Drawn) -> dict[str, Any]:
     """Return the values of a frame, as shares of their ranges."""
     values = {
-        field.name: drawn.packed(field, field.limits.shares) for field in frame.fields if not _is_derived(field, frame)
+        field.name: drawn.packed(field, field.limits.whole.shares)
+        for field in frame.fields
+        if not _is_derived(field, frame)
     }
     vectors = frame.vectors and drawn.packed(frame.vectors, lambda found: 0.5 + 0.5 * found / bound)
     return {"label": frame.label, "values": values, "vectors": vectors}

@@ -4,9 +4,10 @@ const DECADES = 1e-4;  // of the largest value: where a logarithmic range of val
 
 // The values between which a field is coloured, evenly or by their logarithms.
 class ColorRange {
-  constructor({low, high, logarithmic, remark}) {
+  constructor({low, high, logarithmic, remark, shown = high}) {
     Object.assign(this, {least: low, largest: high, first: logarithmic, remark});
     this.reset();
+    this.high = shown;  // a stress that is infinite somewhere is shown as it is elsewhere
   }
 
   reset() {
@@ -20,6 +21,12 @@ class ColorRange {
   set inDecades(wanted) {
     this.logarithmic = wanted;
     if (wanted && this.low <= 0) this.low = DECADES * this.high;
+  }
+
+  // What stands behind the title of a bar.
+  get words() {
+    const larger = !this.remark && this.high < 0.9999 * this.largest && `▸ up to ${written(this.largest)}`;
+    return [this.logarithmic && "logarithmic", larger].filter(Boolean);
   }
 
   // Why a range cannot be shown; "" where it can.
@@ -82,7 +89,7 @@ function showLegend(scene, field, range) {
     });
     return;
   }
-  put(place, "title", range.logarithmic ? `${field.title}, logarithmic` : field.title);
+  put(place, "title", [field.title, ...range.words].join(", "));
   const bar = put(place, "bar"), colors = stops(scene.map);
   put(bar, "colors").style.background = range.remark ? colors[128] : `linear-gradient(to right, ${colors.join(",")})`;
   if (range.remark) put(place, "end", range.remark);

@@ -76,7 +76,7 @@ function drawBar(pen, scene, field, range, heading, width, top) {
   pen.fillStyle = "#111";
   pen.textAlign = "left";
   pen.textBaseline = "top";
-  pen.fillText([field.title, range.logarithmic && "logarithmic", range.remark, heading].filter(Boolean).join(", "), left, top + 2);
+  pen.fillText([field.title, ...range.words, range.remark, heading].filter(Boolean).join(", "), left, top + 2);
   const colors = stops(scene.map);
   for (let k = 0; k < 256; k++) {
     pen.fillStyle = colors[range.remark ? 128 : k];
