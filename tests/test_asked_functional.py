@@ -170,6 +170,13 @@ def test_a_law_without_symmetry_has_no_energy():
         iga_nn.solve(BOX, iga_nn.Problem(Wind(), exact="x"), ask="energy")
 
 
+def test_a_solution_without_such_a_number_has_the_reason():
+    broken = iga_nn.solve(BOX, HEAT)
+    broken.only.coefficients[:] = np.nan
+    found = functional(Ask("u max"), HEAT, BOX).answer(broken)
+    assert np.isnan(found.value) and found.lower is None and found.why.startswith("extremes are of finite numbers")
+
+
 def test_a_report_shows_answers_first(heat):
     solution = iga_nn.solve(BOX, HEAT, ask=[iga_nn.Ask("u max"), "mean u"])
     assert str(solution.report).startswith("u max = 9 at (2, 1, 1)")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 
@@ -64,8 +65,11 @@ class Functional(ABC):
         return None
 
     def answer(self, solution: FieldOnBody) -> Answer:
-        """Return the answer without an interval."""
-        value, at = self.found(solution)
+        """Return the answer without an interval; no number, and the reason, where a solution has no such number."""
+        try:
+            value, at = self.found(solution)
+        except ValueError as error:
+            return Answer(self.ask.text, math.nan, why=str(error).removeprefix(f"{self.ask.role}: "))
         return Answer(self.ask.text, value, at=at, said=self.said, dimension=self.dimension)
 
     def quantity_of(self, form: Form) -> Quantity:

@@ -5,6 +5,7 @@ of u_h at the adjoint of J in the raised space, the dual weighted residual (Beck
 One solve serves all quantities, and those that are not linear. docs/solver.md says what the interval promises.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -12,6 +13,7 @@ from ..answer import NOT_ESTIMATED, Answer
 from ..options import SolveOptions
 from ..solution import Solution
 from ..system import System
+from .away import away
 from .functional import Functional, Reaction
 from .raised import Raised, why_not_raised
 from .scatter import scatter
@@ -28,6 +30,7 @@ def answers(
     system: System, solution: Solution, functionals: Sequence[Functional], options: SolveOptions
 ) -> tuple[Answer, ...]:
     """Return the answers to what is asked of the solution of a system. options: those of the solve."""
+    functionals = [away(one, solution) for one in functionals]
     if why := why_not_answered(system, solution):
         return tuple(replace(one.answer(solution), why=f"{NOT_ESTIMATED}: {why}") for one in functionals)
     raised = Raised.of(system, solution, options)
@@ -42,6 +45,8 @@ def why_not_answered(system: System, solution: Solution) -> str:
 def answer(asked: Functional, solution: Solution, raised: Raised) -> Answer:
     """Return the answer to one quantity, with its interval from the raised solution."""
     found = asked.answer(solution)
+    if math.isnan(found.value):
+        return found
     added = abs(asked.value(raised.solution) - found.value)
     around = 0.0
     if not isinstance(asked, Reaction) and (samples := asked.samples(solution)) is not None:
