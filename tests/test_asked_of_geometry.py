@@ -88,3 +88,17 @@ def test_without_a_surface_nothing_is_known() -> None:
     system = discretize(_quarter(), problem)
     one = functional(Ask("energy"), problem, _quarter())
     assert of_geometry(system, system.solve(estimate=False), [one]) == [NO_SURFACE]
+
+
+def test_an_interval_has_the_part_of_the_distance() -> None:
+    part = iga_nn.sample("cube").part
+    box = iga_nn.BSplineVolume.from_function(lambda u, v, w: (u, v, (1.0 + STEP) * w), 4)
+    problem = iga_nn.Elasticity(fix="z < 1e-6", load={"nz > 0.9": (0, 0, 1)}, poisson_ratio=0.0)
+    ask = ["mean uz over nz > 0.9", "reaction z of z < 1e-6"]
+    plain = iga_nn.solve(box, problem, ask=ask, estimate=False).answers
+    known = iga_nn.solve(box, problem.on_surface(part), ask=ask, estimate=False).answers
+    assert "geometry" not in plain[0].parts and plain[0].why.endswith("geometry: not known, no surface is given")
+    assert known[0].parts["geometry"] == pytest.approx(STEP, rel=0.1)  # u = 1.001 in the place of 1
+    assert known[0].lower is not None and known[0].upper is not None
+    assert known[0].lower < 1.0 < known[0].upper and known[0].why.endswith("geometry: 0.001 off the surface at most")
+    assert known[1].parts["geometry"] < 1e-6

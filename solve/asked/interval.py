@@ -2,7 +2,7 @@
 
 The error of a quantity J is J(u+) - J(u_h), with the solution u+ on the raised space. For a linear J it is the residual
 of u_h at the adjoint of J in the raised space, the dual weighted residual (Becker, Rannacher, *Acta Numerica*, 2001).
-One solve serves all quantities, and those that are not linear. docs/solver.md says what the interval promises.
+One solve serves all quantities, and those that are not linear. docs/intervals.md says what an interval promises.
 """
 
 import math
@@ -15,6 +15,8 @@ from ..solution import Solution
 from ..system import System
 from .away import away
 from .functional import Functional, Reaction
+from .geometry import GeometryPart
+from .of_geometry import of_geometry
 from .raised import Raised, why_not_raised
 from .scatter import scatter
 
@@ -34,7 +36,16 @@ def answers(
     if why := why_not_answered(system, solution):
         return tuple(replace(one.answer(solution), why=f"{NOT_ESTIMATED}: {why}") for one in functionals)
     raised = Raised.of(system, solution, options)
-    return tuple(answer(one, solution, raised) for one in functionals)
+    found = [answer(one, solution, raised) for one in functionals]
+    return tuple(map(_with_geometry, found, of_geometry(system, solution, functionals)))
+
+
+def _with_geometry(given: Answer, found: GeometryPart | str) -> Answer:
+    """Return an answer with the part of the distance to the true surface, or with the line that says it has none."""
+    if isinstance(found, str):
+        return replace(given, why=f"{given.why}; geometry: not known, {found}")
+    widened = within(given, {"geometry": found.part})
+    return replace(widened, why=f"{given.why}; geometry: {found.distance:.2g} off the surface at most")
 
 
 def why_not_answered(system: System, solution: Solution) -> str:

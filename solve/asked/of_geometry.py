@@ -17,7 +17,7 @@ from .functional import Functional, Reaction
 from .geometry import GeometryPart, TrueSurface, geometry_parts
 from .own_change import OwnChange
 
-NO_SURFACE = "the part's surface is not known"
+NO_SURFACE = "no surface is given"
 
 
 def surface_of(solution: Solution) -> TrueSurface | None:
@@ -40,7 +40,10 @@ def of_geometry(
     chosen = [number for number, z in enumerate(adjoints) if isinstance(z, BodyField)]
     own = [OwnChange.of(functionals[number], solution) for number in chosen]
     fields = [z for z in adjoints if isinstance(z, BodyField)]
-    parts = geometry_parts(solution, fields, surface, [one.density for one in own])
+    try:
+        parts = geometry_parts(solution, fields, surface, [one.density for one in own])
+    except ValueError as error:  # of data that are not defined beside the boundary
+        return [str(error)] * len(functionals)
     found = dict(zip(chosen, parts, strict=True))
     for number, one in zip(chosen, own, strict=True):
         found[number] = replace(found[number], change=found[number].change + one.beside(surface))
