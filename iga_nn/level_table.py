@@ -27,6 +27,7 @@ TITLES = {  # keys of report.json and study.csv, in the order they are shown
     "rate_h1": "rate",
     "error_estimate_relative": "estimated relative L2 error",
     "error_estimate": "estimated L2 error",
+    "error_estimate_energy_relative": "estimated relative energy error",
     "iterations": "iterations",
 }
 ESTIMATES = tuple(key for key in TITLES if key.startswith("error_estimate"))

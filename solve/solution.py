@@ -35,6 +35,7 @@ NORMS = {  # name in report.json -> name as shown
     "h1_seminorm": "H1",
     "error_estimate_relative": "estimated relative L2",
     "error_estimate": "estimated L2",
+    "error_estimate_energy_relative": "estimated relative energy",
 }
 
 
@@ -47,8 +48,10 @@ def _known(part: str, norm: str) -> property:
 class SolveReport:
     """Hold the numbers of one solve, an entry of `poisson.levels` in report.json.
 
-    `l2`, `l2_relative`, `h1_seminorm`, `h1_relative`, `error_estimate` and `error_estimate_relative` are float, None
-    where they are unknown; absolute ones in the units of u, and of u times length^(3/2).
+    `l2`, `l2_relative`, `h1_seminorm`, `h1_relative`, `error_estimate`, `error_estimate_relative` and
+    `error_estimate_energy_relative` are float, None where they are unknown; absolute ones in the units of u, and of u
+    times length^(3/2). The last is the error in the energy norm, whose square is an elastic body's energy: that of
+    stresses, in the mean.
 
     Attributes
     ----------
@@ -65,7 +68,7 @@ class SolveReport:
     errors : Errors or None
         Norms of the errors, None without an exact solution.
     estimate : Errors or None
-        Estimate of the L2 error from the residual, where there is no exact solution, or on request.
+        Estimate of the L2 and the energy error from the residual, where there is no exact solution, or on request.
     notices : tuple of str
         Warnings about these numbers, one line each.
     meaningful : bool
@@ -117,6 +120,7 @@ class SolveReport:
     h1_seminorm = _known("errors", "h1_seminorm")
     error_estimate = _known("estimate", "l2")
     error_estimate_relative = _known("estimate", "l2_relative")
+    error_estimate_energy_relative = _known("estimate", "energy_relative")
 
     def as_dict(self) -> dict[str, Any]:
         """Return the entry of report.json; unknown errors are absent."""

@@ -355,7 +355,7 @@ class System:
             solved, processes = self._solved(full), self.unknowns.processes
             with self.unknowns.agreed(), solved[0].space.agreed():
                 squares = estimated_squares(solved, self.body.interfaces, list(self._on_regions(full)))
-            estimate = error_estimate(processes.total(squares), self._energy(free))
+            estimate = error_estimate(processes.total(squares), self._work(free), self._energy(full))
         return errors, estimate
 
     @property
@@ -390,7 +390,15 @@ class System:
         given += sum(np.count_nonzero(face.values) for face in self.matrix.weak)
         return bool(self.unknowns.processes.total(given))
 
-    def _energy(self, free: Array) -> float | None:
+    def _energy(self, full: Sequence[Array]) -> float | None:
+        """Return a(u_h, u_h); None for a law that is not symmetric."""
+        if not self.problem.form.symmetric:
+            return None
+        products = self.matrix.apply(self.matrix.layout.joined(full))
+        found = sum(float((own * product).sum()) for own, product in zip(full, products, strict=True))
+        return float(self.unknowns.processes.total(found))
+
+    def _work(self, free: Array) -> float | None:
         """Return a(u_h, u_h) of free coefficients that solve the system; None where it is not the work of the loads."""
         has_given = self.has_given_values  # of all processes
         if not self.problem.form.symmetric or has_given:

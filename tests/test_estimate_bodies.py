@@ -10,7 +10,7 @@ from scipy.special import zeta
 import iga_nn
 from iga_nn import Body, BSplineVolume, Elasticity, Poisson
 from parameterize.spline.bspline import greville, interpolate_grid
-from solve import Form, Problem
+from solve import Form, Problem, benchmark_volume
 from solve.discretization.estimate import estimated_squares
 from solve.discretization.residual import Solved
 from solve.discretization.waves import LONGER, wave_lengths
@@ -50,6 +50,19 @@ def law(body, is_scalar, held):
 def test_the_estimate_is_one_to_three_errors(name, is_scalar, held, degree):
     body = BODIES[name](degree)
     assert 1.0 < effectivity(body, law(body, is_scalar, held), refine=1) < 3.0
+
+
+@pytest.mark.parametrize("degree", [2, 3])
+@pytest.mark.parametrize("name", ["cube", "plate", "hole"])
+def test_the_energy_estimate_is_one_to_three_errors(name, degree):
+    """The energy norm of Poisson's equation is the H1 seminorm."""
+    if name == "cube":
+        body, problem = benchmark_volume(4, degree), Poisson(exact=WAVE)
+    else:
+        body = BODIES[name](degree)
+        problem = law(body, True, "p0_w0")
+    report = iga_nn.solve(body, problem, estimate=True, tolerance=1e-9).report
+    assert 0.9 < report.error_estimate_energy_relative / report.h1_relative < 3.0
 
 
 @pytest.mark.slow

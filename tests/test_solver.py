@@ -118,6 +118,7 @@ def test_report_entry_has_the_keys_of_report_json():
     assert set(solve_problem(benchmark_volume(3), WAVE, estimate=True).report.as_dict()) - set(entry) == {
         "error_estimate",
         "error_estimate_relative",
+        "error_estimate_energy_relative",
     }
     assert set(entry["seconds"]) == {"setup", "solve", "errors"}
     assert entry["elements"] == 27

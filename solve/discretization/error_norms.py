@@ -44,13 +44,15 @@ class Errors:
     """Hold the L2 norm and the H1 seminorm of u - u_h, and their ratios to the norms of u.
 
     The relative errors are None where u or its gradient is zero, both H1 numbers where the gradient of u is unknown. An
-    estimate is relative to u_h, and has no H1 numbers.
+    estimate is relative to u_h, and has no H1 numbers. energy_relative: the energy norm of an estimated error over that
+    of u_h; None where the law has no energy.
     """
 
     l2: float
     l2_relative: float | None
     h1_seminorm: float | None = None
     h1_relative: float | None = None
+    energy_relative: float | None = None
 
 
 def error_norms(parts: Sequence[Compared], threads: int = 1, processes: Processes | None = None) -> Errors:

@@ -42,18 +42,19 @@ def estimated_squares(
     return np.asarray(sum(chain(squares, map(_on_regions, on_regions) if glued else ()), np.zeros(3)))
 
 
-def error_estimate(squares: Array, energy: float | None = None) -> Errors:
+def error_estimate(squares: Array, work: float | None = None, energy: float | None = None) -> Errors:
     """Return the estimated error from the squared norms (3,) of `estimated_squares`, over the whole body.
 
-    energy: a(u_h, u_h) for a symmetric law whose given values are zero, otherwise None. With `energy`, the work of the
-    loads on the error is the square of its energy norm, and an equal share of u_h is added to the estimate: discrete
-    bodies in bending are too stiff by that share.
+    energy: a(u_h, u_h) for a symmetric law, otherwise None. work: the same where given values are zero, otherwise None.
+    With `work`, the work of the loads on the error is the square of its energy norm, and an equal share of u_h is added
+    to the estimate: discrete bodies in bending are too stiff by that share.
     """
     square, energy_of_error, norm = squares.tolist()
     norm = math.sqrt(norm)
-    soft = norm * energy_of_error / energy if energy is not None and energy > 0.0 else 0.0
+    soft = norm * energy_of_error / work if work is not None and work > 0.0 else 0.0
     l2 = math.hypot(math.sqrt(square), soft)
-    return Errors(l2, ratio(l2, norm))
+    size = math.sqrt(energy) if energy is not None and energy > 0.0 else 0.0
+    return Errors(l2, ratio(l2, norm), energy_relative=ratio(math.sqrt(energy_of_error), size))
 
 
 def why_not_estimated(spaces: Sequence[TrialSpace], problems: Sequence[BoundaryValueProblem]) -> str:
