@@ -19,6 +19,7 @@ from .version import __version__
 os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
 
 _HOME = {  # module, and the name there where it is another one; type checkers read __init__.pyi
+    "Adapted": "solve",
     "Ask": "solve",
     "BSplineVolume": "parameterize.spline.volume",
     "Body": "parameterize.spline.body",
@@ -51,6 +52,7 @@ _HOME = {  # module, and the name there where it is another one; type checkers r
     "System": "solve",
     "Value": "solve.forms.conditions",
     "WorkerOptions": "iga_nn.options",
+    "adaptive": "solve",
     "certify": "parameterize.certificate.certify",
     "convergence": "solve",
     "discretize": "solve",

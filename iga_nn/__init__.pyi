@@ -8,6 +8,7 @@ from parameterize.spline.volume import BSplineVolume as BSplineVolume
 from parameterize.surface.surface import MeshError as MeshError
 from parameterize.surface.surface import Surface as Surface
 from parameterize.surface.surface import load_surface as load_surface
+from solve import Adapted as Adapted
 from solve import Ask as Ask
 from solve import Elasticity as Elasticity
 from solve import Form as Form
@@ -19,6 +20,7 @@ from solve import Problem as Problem
 from solve import Region as Region
 from solve import SplineField as SplineField
 from solve import System as System
+from solve import adaptive as adaptive
 from solve import convergence as convergence
 from solve import discretize as discretize
 from solve import integrate as integrate

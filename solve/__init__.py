@@ -45,6 +45,9 @@ from .options import SolveOptions as SolveOptions
 from .options import check_device as check_device
 from .quantities import Extremes as Extremes
 from .reactions import Balance as Balance
+from .refinement.adaptive import Adapted as Adapted
+from .refinement.adaptive import adaptive as adaptive
+from .refinement.loop import Step as Step
 from .singular import SingularPlace as SingularPlace
 from .singular import SingularPlaces as SingularPlaces
 from .solution import PatchSolution as PatchSolution
