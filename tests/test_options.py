@@ -4,6 +4,7 @@ from dataclasses import fields, replace
 
 import pytest
 
+import iga_nn
 from iga_nn.cli.commands import main
 from iga_nn.errors import InputError
 from iga_nn.options import (
@@ -150,3 +151,10 @@ def test_a_value_of_another_kind_is_refused_where_the_options_are_made(made, say
 def test_problems_that_cannot_be_run_are_refused(asked, says):
     with pytest.raises(InputError, match=says):
         asked()
+
+
+def test_a_plane_of_a_solid_model_has_a_sign_of_its_own():
+    body = iga_nn.ElasticityOptions(fix=("plane z = 0",), load=("plane x=60 or plane x=-6=0;0;-1",))
+    fix, load = body.conditions(3)
+    assert str(fix.region) == "plane z = 0"
+    assert str(load.region) == "plane x=60 or plane x=-6" and load.text == "0;0;-1"

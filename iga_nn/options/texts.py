@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 _EQUALS = re.compile("(?<![<>=])=(?!=)")
 _OWNER = re.compile(r"""(?:^|,)\s*("[^"]*"|'[^']*'|[^,:"']*[^,:"'\s])\s*:""")
 _PATCH = re.compile(r"p(\d+)")
-_QUOTED = re.compile("\"[^\"]*\"|'[^']*'")
+_OF_REGION = re.compile("\"[^\"]*\"|'[^']*'|plane\\s+[xyz]\\s*=")  # quoted text, and planes of a solid model
 
 
 def faces(name: str, entries: Sequence[str]) -> dict[str, str | None]:
@@ -31,12 +31,12 @@ def faces(name: str, entries: Sequence[str]) -> dict[str, str | None]:
 def on_regions(kind: str, entries: Sequence[str], read: Callable[[str], Any]) -> dict[str, Any]:
     """Return REGION=DATA and REGION entries as a table.
 
-    read: the function that converts the text of the data; an entry without data has None. The = of <= and >=, and
-    quoted text, belong to the region. Raises InputError for a region with two entries.
+    read: the function that converts the text of the data; an entry without data has None. The = of <= and >=, that of
+    "plane x=60", and quoted text belong to the region. Raises InputError for a region with two entries.
     """
     found: dict[str, Any] = {}
     for entry in entries:
-        split = _EQUALS.search(_QUOTED.sub(lambda text: "." * len(text[0]), entry))
+        split = _EQUALS.search(_OF_REGION.sub(lambda text: "." * len(text[0]), entry))
         region = (entry if split is None else entry[: split.start()]).strip()
         if not region:
             raise InputError(f"{kind} {entry!r:.80}: write a region before the =, such as 'nz > 0.9'")
