@@ -42,6 +42,8 @@ def answers(
 
 def _with_geometry(given: Answer, found: GeometryPart | str) -> Answer:
     """Return an answer with the part of the distance to the true surface, or with the line that says it has none."""
+    if given.lower is None:
+        return given
     if isinstance(found, str):
         return replace(given, why=f"{given.why}; geometry: not known, {found}")
     widened = within(given, {"geometry": found.part})

@@ -20,9 +20,10 @@ from .own_change import OwnChange
 NO_SURFACE = "no surface is given"
 
 
-def surface_of(solution: Solution) -> TrueSurface | None:
-    """Return the part's surface mesh that the regions of a problem know; None where they know none."""
+def surface_of(solution: Solution, functionals: Sequence[Functional]) -> TrueSurface | None:
+    """Return the part's surface mesh that a problem's regions or the asks know; None where they know none."""
     known: list[Any] = [condition.region.surface for condition in solution.problem.conditions]
+    known += [one.ask.surface for one in functionals]
     return next((one for one in known if isinstance(one, TrueSurface)), None)
 
 
@@ -33,30 +34,32 @@ def of_geometry(
 
     surface: by default that of `surface_of`.
     """
-    surface = surface or surface_of(solution)
+    surface = surface or surface_of(solution, functionals)
     if surface is None:
         return [NO_SURFACE] * len(functionals)
-    adjoints = [_adjoint(system, solution, one) for one in functionals]
+    own = [OwnChange.of(one, solution) for one in functionals]
+    adjoints = [_adjoint(system, solution, one) for one in own]
     chosen = [number for number, z in enumerate(adjoints) if isinstance(z, BodyField)]
-    own = [OwnChange.of(functionals[number], solution) for number in chosen]
     fields = [z for z in adjoints if isinstance(z, BodyField)]
     try:
-        parts = geometry_parts(solution, fields, surface, [one.density for one in own])
+        parts = geometry_parts(solution, fields, surface, [own[number].density for number in chosen])
     except ValueError as error:  # of data that are not defined beside the boundary
         return [str(error)] * len(functionals)
     found = dict(zip(chosen, parts, strict=True))
-    for number, one in zip(chosen, own, strict=True):
-        found[number] = replace(found[number], change=found[number].change + one.beside(surface))
+    for number in chosen:
+        found[number] = replace(found[number], change=found[number].change + own[number].beside(surface))
     return [found[number] if isinstance(z, BodyField) else z for number, z in enumerate(adjoints)]
 
 
-def _adjoint(system: System, solution: Solution, functional: Functional) -> BodyField | str:
+def _adjoint(system: System, solution: Solution, own: OwnChange) -> BodyField | str:
     """Return the adjoint of a quantity, or why there is none."""
     if why := why_no_adjoint(system):
         return why
-    if isinstance(functional, Reaction):
-        return _of_reaction(system, functional)
-    samples = functional.samples(solution)
+    if not np.isfinite(own.value):
+        return "the quantity has no value"
+    if isinstance(own.functional, Reaction):
+        return _of_reaction(system, own.functional)
+    samples = own.functional.samples(solution)
     return "the quantity has no linearisation" if samples is None else adjoint(system, samples)
 
 
