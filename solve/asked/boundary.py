@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from parameterize.arrays import Array, IntArray
+from parameterize.arrays import Array, IntArray, Mask
 from parameterize.spline.body import Body
-from parameterize.spline.bspline import gauss_points
+from parameterize.spline.bspline import breakpoints, gauss_points
 from parameterize.spline.orientation import FACES
 from parameterize.spline.volume import FACE_NAMES
 
@@ -16,22 +16,24 @@ from ..discretization.on_regions import Acting, codes_on
 from ..field import BodyField, Points
 from ..field_groups import FieldGroup, groups_of
 from ..forms.boundary_value_problem import BoundaryValueProblem
-from ..forms.form import reaction
+from ..forms.form import Quantity, reaction
 from ..quantities import at_places
 from ..solution import Solution
 
 STEP = 1e-5  # of the body's size: the difference of data by which their slope is found
 MOST = 2**15  # points at once
+FLAT = 0.3  # sine of the angle between a face and the parameter line across: below it normal derivatives are poor
 
 
 @dataclass(frozen=True, eq=False)
 class Values:
-    """Hold a function at m points: values and reaction (c, m), gradient and flux (c, 3, m)."""
+    """Hold a function at m points: values and reaction (c, m), gradient and flux (c, 3, m), a pressure (m,) if any."""
 
     u: Array
     grad: Array
     flux: Array
     reaction: Array
+    pressure: Array | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,6 +77,12 @@ class Piece:
     z: tuple[Values, ...]
     source: Array
     given: Given
+
+    def of_solution(self, quantity: Quantity) -> Array:
+        """Return a quantity (..., m) of the solution."""
+        x = Points.at(np.ascontiguousarray(self.x), self.places)
+        x.pressure = self.u.pressure
+        return np.asarray(quantity(self.u.u, self.u.grad, x), dtype=np.float64)
 
 
 def pieces_of(solution: Solution, adjoints: Sequence[BodyField]) -> Iterator[Piece]:
@@ -134,15 +142,18 @@ def _piece(
     owners, where = np.repeat(chosen, len(grid.weights)), np.tile(grid.parameters, (len(chosen), 1))
     axis, side = FACES[grid.face]
     jacobian = group.maps.slopes_at(owners, where)
-    slope = np.linalg.inv(jacobian)[:, axis].T * (1.0 if side else -1.0)  # of the parameter across, outward
-    size = np.linalg.norm(slope, axis=0)
-    normal = slope / size
+    own, each = group.numbers[chosen], np.repeat(np.arange(len(chosen)), len(grid.weights))
+    normal, size = _normals(jacobian, axis, side, each)
     x = Points.at(np.ascontiguousarray(group.maps.at(owners, where).T), where)
-    weights = np.tile(grid.weights, len(chosen)) * np.abs(np.linalg.det(jacobian)) * size
-    own, problem = group.numbers[chosen], problems[group.numbers[chosen[0]]]
+    weights = np.tile(grid.weights, len(chosen)) * size
+    problem = problems[own[0]]
     names = [problems[number].prefix + FACE_NAMES[grid.face] for number in own]
     nets = [np.take(body.patches[number].control_points, -side, axis=axis).reshape(-1, 3) for number in own]
     data = _Data(problem, FACE_NAMES[grid.face], x, normal, weights, STEP * body.size)
+    given = data.given(np.stack(nets), names, each)
+    across = jacobian[:, :, axis].T
+    flat = np.abs((across * normal).sum(axis=0)) < FLAT * np.linalg.norm(across, axis=0)
+    at = _Traces(problem, grid.face, owners, where, normal, given, flat)
     return Piece(
         group=group,
         rows=owners,
@@ -151,25 +162,91 @@ def _piece(
         normal=normal,
         weights=weights,
         curvature=curvature(group, owners, where, axis, jacobian, normal),
-        elements=np.repeat(np.arange(len(chosen)), len(grid.weights)) * (1 + int(grid.spans.max()))
-        + np.tile(grid.spans, len(chosen)),
-        u=_values(group, problem, owners, where),
-        z=tuple(_values(one, problem, owners, where) for one in of_z),
+        elements=each * (1 + int(grid.spans.max())) + np.tile(grid.spans, len(chosen)),
+        u=at.values(group, given.loads, np.ones(len(where), dtype=bool)),
+        z=tuple(at.values(one, np.zeros_like(given.loads), flat) for one in of_z),
         source=np.asarray(problem.source_at(x)),
-        given=data.given(np.stack(nets), names, np.repeat(np.arange(len(chosen)), len(grid.weights))),
+        given=given,
     )
 
 
-def _values(group: FieldGroup, problem: BoundaryValueProblem, owners: IntArray, where: Array) -> Values:
-    """Return a function at parameters (m, 3) of the patches `owners` (m,) of a group."""
-    form, c, m = problem.form, problem.form.components, len(where)
+def _normals(jacobian: Array, axis: int, side: int, owners: IntArray) -> tuple[Array, Array]:
+    """Return outward unit normals (3, m) and surface elements (m,), from the derivatives (m, 3, 3) of patches (m,)."""
+    area = np.cross(jacobian[:, :, (axis + 1) % 3], jacobian[:, :, (axis + 2) % 3])
+    hands = np.sign(np.bincount(owners, np.linalg.det(jacobian)))[owners]
+    size = np.linalg.norm(area, axis=1)
+    outward = (hands if side else -hands)[:, None] * area / np.where(size > 0.0, size, 1.0)[:, None]
+    return np.ascontiguousarray(outward.T), size
 
-    def every(u: Array, grad: Array, x: Array) -> Array:
+
+@dataclass(frozen=True, eq=False)
+class _Traces:
+    """Evaluate functions at points of a face, with normal derivatives from the data where the spline's are poor.
+
+    A cube's map of a smooth body is flat at the cube's edges: there the parameter across a face runs along it, and the
+    normal derivative of a spline is a quotient of small numbers. The tangential ones are good all over.
+
+    flat: (m,), the mask of such points.
+    """
+
+    problem: BoundaryValueProblem
+    face: int
+    owners: IntArray
+    where: Array
+    normal: Array
+    given: Given
+    flat: Mask
+
+    def values(self, group: FieldGroup, loads: Array, known: Mask) -> Values:
+        """Return a function with a given flux; its free normal derivatives follow from the flux at points `known`."""
+        form, c, m = self.problem.form, self.problem.form.components, len(self.where)
+        steep = self._steep(group)
+
+        def every(u: Array, grad: Array, x: Array) -> Array:
+            along = grad - np.einsum("cam,am,bm->cbm", grad, self.normal, self.normal)
+            held = np.einsum("cdm,dm->cm", self.given.projector, steep)
+            pull = loads - self.given.factor * u
+            slope = np.where(known, self._slope(u, along + held[:, None] * self.normal, x, pull) + held, steep)
+            found = along + slope[:, None] * self.normal
+            flux = np.asarray(form.flux(u, found, x), dtype=np.float64)
+            pressure = getattr(x, "pressure", None)
+            parts = [u, found.reshape(3 * c, m), flux.reshape(3 * c, m), reaction(form, u, found, x)]
+            return np.concatenate([*parts, *([] if pressure is None else [pressure[None]])])
+
+        rows = at_places(group, every, self.owners, self.where)
+        u, grad, flux, react, rest = np.split(rows, [c, 4 * c, 7 * c, 8 * c])
+        pressure = rest[0] if len(rest) else None
+        return Values(u, grad.reshape(c, 3, m), flux.reshape(c, 3, m), react, pressure)
+
+    def _steep(self, group: FieldGroup) -> Array:
+        """Return the normal derivatives (c, m) of the spline; at flat points those half a span inside."""
+        found = self._normal_slope(group, self.where, np.arange(len(self.where)))
+        here = np.flatnonzero(self.flat)
+        if len(here):
+            axis, side = FACES[self.face]
+            breaks = breakpoints(group.values.knots[axis])
+            inside = self.where[here]
+            inside[:, axis] = 0.5 * (breaks[-1] + breaks[-2] if side else breaks[0] + breaks[1])
+            found[:, here] = self._normal_slope(group, inside, here)
+        return found
+
+    def _normal_slope(self, group: FieldGroup, where: Array, points: IntArray) -> Array:
+        normal = self.normal[:, points]
+        return at_places(group, lambda u, grad, x: np.einsum("cam,am->cm", grad, normal), self.owners[points], where)
+
+    def _slope(self, u: Array, grad: Array, x: Array, pull: Array) -> Array:
+        """Return what a gradient lacks along the normal (c, m) so that the flux in the free directions is `pull`."""
+        form, unit = self.problem.form, np.eye(len(u))[:, :, None]
+        free = unit - self.given.projector
         flux = np.asarray(form.flux(u, grad, x), dtype=np.float64)
-        return np.concatenate([u, grad.reshape(3 * c, m), flux.reshape(3 * c, m), reaction(form, u, grad, x)])
-
-    u, grad, flux, react = np.split(at_places(group, every, owners, where), [c, 4 * c, 7 * c])
-    return Values(u, grad.reshape(c, 3, m), flux.reshape(c, 3, m), react)
+        rest = np.einsum("cdm,dm->cm", free, pull - (flux * self.normal).sum(axis=1))
+        columns = []
+        for direction in unit:
+            more = np.asarray(form.flux(u, grad + (direction * np.ones(len(self.where)))[:, None] * self.normal, x))
+            columns.append(((more - flux) * self.normal).sum(axis=1))
+        law = np.einsum("cdm,dem,efm->mcf", free, np.stack(columns, axis=1), free)
+        law += np.moveaxis(self.given.projector, -1, 0)
+        return np.asarray(np.linalg.solve(law, rest.T[:, :, None])[:, :, 0].T)
 
 
 def curvature(group: FieldGroup, owners: IntArray, where: Array, axis: int, jacobian: Array, normal: Array) -> Array:

@@ -22,7 +22,7 @@ def sampled(pieces: list[tuple[Piece, Array]], quantity_of: QuantityOf) -> Sampl
 
 def _of_piece(piece: Piece, weights: Array, quantity_of: QuantityOf) -> Samples:
     rows = piece.form.components + piece.group.has_pressure
-    slopes = at_places(piece.group, _slopes(quantity_of(piece.form)), piece.rows, piece.places) * weights
+    slopes = at_places(piece.group, slopes_of(quantity_of(piece.form)), piece.rows, piece.places) * weights
     return Samples(piece.patches, piece.places, slopes[:rows], slopes[rows:].reshape(piece.form.components, 3, -1))
 
 
@@ -36,7 +36,7 @@ def joined(parts: list[Samples]) -> Samples:
     )
 
 
-def _slopes(quantity: Quantity) -> Quantity:
+def slopes_of(quantity: Quantity) -> Quantity:
     """Return the quantity (k, m) of a quantity's derivatives: by u (c, m), by a pressure (m,), and by the gradient.
 
     Those by the gradient (c, 3, m) come last; a pressure is that of a nearly incompressible body, if there is one.

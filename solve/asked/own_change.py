@@ -19,9 +19,8 @@ from .boundary import Piece as OnBoundary
 from .boundary import Values, curvature
 from .functional import Flow, Functional, Integral, Reaction
 from .geometry import TrueSurface
-from .linearised import sampled
+from .linearised import slopes_of
 from .parts import Piece
-from .samples import Samples
 
 ON_FACE = 1e-6  # in the parameters: a place as near to a face lies on it
 STEP = 1e-4  # in the parameters: the difference by which the slope of a quantity along the normal is found
@@ -53,15 +52,18 @@ class OwnChange:
             return np.einsum("cm,cdm,dm->m", piece.source - piece.u.reaction, piece.given.projector, z.u)
         if not isinstance(self.functional, Integral) or self.functional.part.on_boundary:
             return np.zeros(len(piece.weights))
-        own = Piece(piece.group, piece.rows, piece.places, piece.weights)
+        problem = piece.group.problem
+        assert problem is not None
+        quantity, c = self.functional.quantity_of(problem.form), problem.form.components
         share = self.functional.part.holds(np.asarray(piece.x)) / self.size
-        values = np.ravel(own.values(self.functional.quantity_of))
+        values = np.ravel(piece.of_solution(quantity))
         inside = values - self.value if self.functional.ask.kind == "mean" else values
-        return share * inside - self._through_held(piece, sampled([(own, share)], self.functional.quantity_of))
+        of_grad = share * piece.of_solution(slopes_of(quantity))[-3 * c :].reshape(c, 3, -1)
+        return share * inside - self._through_held(piece, of_grad)
 
-    def _through_held(self, piece: OnBoundary, samples: Samples) -> Array:
-        """Return the part (m,) of the adjoint's flux through held faces that J itself makes up."""
-        pull = np.einsum("cam,am->cm", samples.of_grad, piece.normal)
+    def _through_held(self, piece: OnBoundary, of_grad: Array) -> Array:
+        """Return the part (m,) of the adjoint's flux through held faces that J itself makes up, of_grad (c, 3, m)."""
+        pull = np.einsum("cam,am->cm", of_grad, piece.normal)
         slope = np.einsum("cdm,dam,am->cm", piece.given.projector, piece.u.grad, piece.normal)
         return np.asarray((pull * (slope - piece.given.value_slope)).sum(axis=0))
 
