@@ -34,6 +34,8 @@ class FieldGroup:
         That of the first patch, whose law is the law of all; None where it is unknown.
     has_pressure : bool
         Whether the last column is a pressure.
+    gradients : SplineStack, optional
+        The gradients in space that quantities take, three columns a component; by default those of the functions.
     """
 
     numbers: IntArray
@@ -41,13 +43,16 @@ class FieldGroup:
     values: SplineStack
     problem: BoundaryValueProblem | None
     has_pressure: bool = False
+    gradients: SplineStack | None = None
 
     def __len__(self) -> int:
         return len(self.numbers)
 
     def take(self, rows: IntArray | slice) -> "FieldGroup":
         """Return some of the patches. rows: their places in the group."""
-        return replace(self, numbers=self.numbers[rows], maps=self.maps.take(rows), values=self.values.take(rows))
+        maps, values = self.maps.take(rows), self.values.take(rows)
+        gradients = None if self.gradients is None else self.gradients.take(rows)
+        return replace(self, numbers=self.numbers[rows], maps=maps, values=values, gradients=gradients)
 
     def function_on(self, u: Array, v: Array, w: Array) -> Array:
         """Return the functions (k, len(u), len(v), len(w), c) on a tensor grid of parameters, without a pressure."""

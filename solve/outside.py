@@ -1,4 +1,7 @@
-"""Searches extremes of gradients and stresses outside of the singular places, where they are infinite."""
+"""Searches extremes of gradients and stresses outside of the singular places, where they are infinite.
+
+Where patches meet their gradients are averaged.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -8,6 +11,7 @@ import numpy as np
 
 from parameterize.arrays import Mask
 
+from .averaging import averaged_groups
 from .field import FieldOnBody
 from .field_groups import FieldGroup, groups_of
 from .forms.form import Form, Quantity
@@ -24,11 +28,7 @@ from .quantities import (
 )
 from .singular import SPANS, SingularPlaces
 
-RADII = (
-    SPANS,
-    SPANS / 2.0,
-    SPANS / 4.0,
-)  # in spans: smaller ones where the whole of a coarse mesh lies within the first
+RADII = (SPANS, SPANS / 2.0, SPANS / 4.0)  # in spans: smaller ones where all of a coarse mesh lies within the first
 _BESIDE = 2.2  # times the radius: a mesh of spans twice as long left this out, up to its rounding
 
 
@@ -50,18 +50,17 @@ class _Outside:
 
 def extremes_outside(solution: FieldOnBody, what: str | Quantity, places: SingularPlaces) -> Extremes:
     """Return the extremes of a quantity, of one that is infinite at singular places those outside of them."""
-    groups = groups_of(solution)
-    if not len(places) or not needs_gradient(form_of(groups[0]), what):
+    if not needs_gradient(form_of(groups_of(solution)[0]), what):
         return extremes(solution, what)
-    return _found(groups, [what], PER_SPAN, places)[0]
+    return _found(averaged_groups(solution), [what], PER_SPAN, places)[0]
 
 
 def all_extremes_outside(solution: FieldOnBody, places: SingularPlaces) -> dict[str, Extremes]:
     """Return the extremes of the quantities in reports, by name, as `extremes_outside` does for each."""
-    groups = groups_of(solution)
+    groups = averaged_groups(solution)
     form = form_of(groups[0])
     names = [name for name in form.reported if needs_gradient(form, name)]
-    if not len(places) or not names:
+    if not names or not len(places) and groups[0].gradients is None:
         return all_extremes(solution)
     per_span, rest = samples_per_span(groups, SAMPLES), [name for name in form.reported if name not in names]
     found = dict(zip(names, _found(groups, names, per_span, places), strict=True))
@@ -76,6 +75,8 @@ def _found(
 ) -> list[Extremes]:
     """Return the extremes outside of the largest radius that leaves something of the body."""
     quantities = [[quantity_of(form_of(group), what) for what in whats] for group in groups]
+    if not len(places):
+        return extremes_of(groups, quantities, per_span)
     for spans in RADII:
         outside = _Outside(places, spans)
         try:

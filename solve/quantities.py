@@ -145,27 +145,37 @@ def grid_values(field: SplineField, quantity: Quantity, u: Array, v: Array, w: A
 
 def group_values(group: FieldGroup, quantity: Quantity, u: Array, v: Array, w: Array) -> Array:
     """Return a quantity (..., k, n_u, n_v, n_w) on a grid of each of k patches."""
+    values, x = np.moveaxis(group.values.grid(u, v, w), -1, 0), group.points_on(u, v, w)
+    if group.gradients is not None:
+        return _found(quantity, values, _in_rows(group.gradients.grid(u, v, w)), x, group.has_pressure)
     slopes, jacobian = group.values.grid_slopes(u, v, w), group.maps.grid_slopes(u, v, w)
-    return _evaluated(
-        quantity,
-        np.moveaxis(group.values.grid(u, v, w), -1, 0),
-        np.moveaxis(slopes, (-2, -1), (0, 1)),
-        np.moveaxis(jacobian, (-2, -1), (0, 1)),
-        group.points_on(u, v, w),
-        group.has_pressure,
-    )
+    slopes, jacobian = (np.moveaxis(part, (-2, -1), (0, 1)) for part in (slopes, jacobian))
+    return _evaluated(quantity, values, slopes, jacobian, x, group.has_pressure)
+
+
+def _in_rows(gradients: Array) -> Array:
+    """Return gradients (c, 3, ...) of an array (..., 3 c)."""
+    return np.moveaxis(gradients, -1, 0).reshape(-1, 3, *gradients.shape[:-1])
 
 
 def _evaluated(quantity: Quantity, u: Array, slopes: Array, jacobian: Array, x: Points, has_pressure: bool) -> Array:
     """Return a quantity (..., shape) from u (c, shape), slopes (c, 3, shape) in the parameters, and J (3, 3, shape).
 
-    has_pressure: whether the last component is a pressure, which the points x take to the quantity. Raises ValueError
-    for a function that fails or does not return numbers of the points' shape.
+    Arguments and errors are those of `_found`.
     """
     inverse = np.moveaxis(np.linalg.inv(np.moveaxis(jacobian, (0, 1), (-2, -1))), (-2, -1), (0, 1))
+    slopes = slopes[:-1] if has_pressure else slopes
+    return _found(quantity, u, np.einsum("cb...,ba...->ca...", slopes, inverse), x, has_pressure)
+
+
+def _found(quantity: Quantity, u: Array, grad: Array, x: Points, has_pressure: bool) -> Array:
+    """Return a quantity (..., shape) from u (c, shape) and its gradient (c, 3, shape) at points.
+
+    has_pressure: whether the last component of u is a pressure, which the points x take to the quantity; it has no
+    gradient. Raises ValueError for a function that fails or does not return numbers of the points' shape.
+    """
     if has_pressure:
-        u, slopes, x.pressure = u[:-1], slopes[:-1], u[-1]
-    grad = np.einsum("cb...,ba...->ca...", slopes, inverse)
+        u, x.pressure = u[:-1], u[-1]
     try:
         found = np.asarray(quantity(u, grad, x), dtype=np.float64)
     except (TypeError, LookupError, AttributeError, ArithmeticError) as error:
@@ -337,10 +347,13 @@ def _zoomed(groups: Sequence[FieldGroup], together: Sequence[Quantity], start: _
 
 def at_places(group: FieldGroup, quantity: Quantity, owners: IntArray, where: Array) -> Array:
     """Return a quantity (..., m) at parameters (m, 3) of patches (m,) of a group."""
-    u, slopes = group.values.at(owners, where), group.values.slopes_at(owners, where)
-    x, jacobian = group.maps.at(owners, where), group.maps.slopes_at(owners, where)
-    u, slopes, jacobian = (np.moveaxis(part, 0, -1) for part in (u, slopes, jacobian))
-    return _evaluated(quantity, u, slopes, jacobian, Points.at(np.ascontiguousarray(x.T), where), group.has_pressure)
+    u = np.moveaxis(group.values.at(owners, where), 0, -1)
+    x = Points.at(np.ascontiguousarray(group.maps.at(owners, where).T), where)
+    if group.gradients is not None:
+        return _found(quantity, u, _in_rows(group.gradients.at(owners, where)), x, group.has_pressure)
+    slopes, jacobian = group.values.slopes_at(owners, where), group.maps.slopes_at(owners, where)
+    slopes, jacobian = (np.moveaxis(part, 0, -1) for part in (slopes, jacobian))
+    return _evaluated(quantity, u, slopes, jacobian, x, group.has_pressure)
 
 
 def _peak(groups: Sequence[FieldGroup], best: _Candidates, row: int) -> tuple[float, Place, Place]:

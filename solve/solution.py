@@ -292,9 +292,9 @@ class Solution(BodyField, Shown):
         """Return the least and the largest value of a quantity of one number a point, and their places.
 
         Of a gradient, a flux or a stress they are those outside of the singular places, where it is infinite, unless
-        asked for everywhere.
+        asked for everywhere. Where patches of a body meet, the mean of their gradients counts, unlike in `quantity`.
         """
-        return extremes(self, what) if everywhere else extremes_outside(self, what, self.singular)
+        return extremes_outside(self, what, SingularPlaces() if everywhere else self.singular)
 
     def all_extremes(self) -> dict[str, Extremes]:
         """Return the extremes of a report, by name (`problem.form.reported`), from one search for all quantities.

@@ -26,6 +26,7 @@ from parameterize.spline.orientation import orientations
 from parameterize.spline.patch_groups import PatchGroup
 from parameterize.spline.spline_stack import SplineStack
 from parameterize.spline.volume import AXES, BSplineVolume
+from solve.averaging import averaged_groups
 from solve.field import FieldOnBody, Points
 from solve.field_groups import FieldGroup, groups_of
 from solve.forms.boundary_value_problem import BoundaryValueProblem
@@ -316,10 +317,10 @@ def quantity_of(
 
     quantity: also a function for each group of patches, whose materials differ, see `solve.field_groups`.
     """
-    groups = known_groups(solution)
-    laws = quantity if isinstance(quantity, Sequence) else [quantity] * len(groups)
-    parts = [(group.numbers, partial(_quantity_on, group, law)) for group, law in zip(groups, laws, strict=True)]
     try:
+        groups = known_averages(solution)
+        laws = quantity if isinstance(quantity, Sequence) else [quantity] * len(groups)
+        parts = [(group.numbers, partial(_quantity_on, group, law)) for group, law in zip(groups, laws, strict=True)]
         samples = sampled(solution.on_body, parts)
     except np.linalg.LinAlgError:  # det J = 0
         return None
@@ -361,6 +362,7 @@ def _ranging_outside(solution: FieldOnBody, field: ColoredField) -> ColoredField
 
 
 known_groups = remembered(groups_of)
+known_averages = remembered(averaged_groups)  # the same groups with one gradient where patches meet
 
 
 def problems_on(problem: BoundaryValueProblem, body: BodyLike) -> list[BoundaryValueProblem]:
