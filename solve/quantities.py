@@ -46,7 +46,7 @@ class Extremes:
         The search left out what lies within so many spans of a singular place; 0 where nothing else is left of a coarse
         mesh, and None where the body has no such place, or the quantity none there.
     radius : float
-        The largest of these radii.
+        The largest distance that so many spans are.
     beside : bool
         Whether the largest value lies where the mesh of one refinement less left it out.
 
@@ -81,7 +81,7 @@ class Extremes:
         found = f"from {self.least:.6g} at {least} to {self.largest:.6g} at {largest}"
         if self.spans is None:
             return found
-        far = f"farther than {self.radius:.3g} from" if self.spans else "all of the mesh near to"
+        far = f"farther than {self.spans:g} spans from" if self.spans else "all of the mesh near to"
         return f"{found}, {far} where it is infinite"
 
 

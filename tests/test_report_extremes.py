@@ -88,7 +88,7 @@ def test_where_stress_is_infinite_stands_first():
     assert extremes.lines(at_rim()) == [
         "stress is infinite at the rim of fix 'x < 1'",
         "largest displacement 0.012 → 0.0123 mm at (12.5, 0, 3.1) mm",
-        "von Mises at most 159 → 160 MPa at (12.5, 0, 3.1) mm, farther than 2 spans (0.8 mm) from there",
+        "von Mises at most 159 → 160 MPa at (12.5, 0, 3.1) mm, farther than 2 spans (up to 0.8 mm) from there",
     ]
     assert extremes.table(at_rim())[1] == ["stress is infinite at", "∞", "∞", "the rim of fix 'x < 1'"]
 
@@ -97,7 +97,7 @@ def test_the_notice_names_the_place_and_the_stress_outside():
     (notice,) = extremes.peak_notices(at_rim())
     assert notice == (
         "the stress is infinite at the rim of fix 'x < 1', and what a mesh gives there is no result; von Mises at most "
-        "160 MPa at (12.5, 0, 3.1) mm, farther than 2 spans (0.8 mm) from there"
+        "160 MPa at (12.5, 0, 3.1) mm, farther than 2 spans (up to 0.8 mm) from there"
     )
     (notice,) = extremes.peak_notices(at_rim(spans=0.0))
     assert "all of this mesh" in notice and "160" not in notice

@@ -133,7 +133,7 @@ def _at(extreme: dict[str, Any], end: str, section: dict[str, Any]) -> str:
         return at
     if not spans:
         return f"{at}, a number without meaning: all of the mesh lies near to where the stress is infinite"
-    radius = f"{extreme['radius']:.3g}{_behind(section.get('unit'))}"
+    radius = f"up to {extreme['radius']:.3g}{_behind(section.get('unit'))}"
     return f"{at}, farther than {spans:g} span{'' if spans == 1.0 else 's'} ({radius}) from there"
 
 

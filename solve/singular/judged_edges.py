@@ -4,7 +4,7 @@ from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -21,6 +21,7 @@ from .wedge import REGULAR, Sector, exponent
 SMOOTH = 10.0  # degrees by which faces of a smooth surface may bend where two patches meet; of 40 CAD parts all are
 # within 5, and re-entrant edges begin at 190
 DIFFER = 0.3  # of two projectors: the norm of the difference from which on two faces are held in different ways
+SIDES: tuple[Literal["left"], Literal["right"]] = ("left", "right")
 _ALIKE = 1e-3  # share by which coefficients of one material may differ
 
 
@@ -67,15 +68,19 @@ class JudgedEdges:
         return np.where(np.abs(total - 180.0) <= SMOOTH, 180.0, total)
 
     @cached_property
-    def sizes(self) -> Array:
-        """Return the size of the largest span across each edge (e, s)."""
-        of, rank = self.of_patches, self._rank
-        other = ACROSS[of.axes]
-        spans = self.spans.outer[of.patches[:, None], other, of.sides]
-        own = (np.linalg.norm(of.inward, axis=-1) * spans[..., None]).max(axis=1)
-        found = np.zeros((len(self.pairs[0]), own.shape[1]))
-        np.maximum.at(found, rank[rank >= 0], own[rank >= 0])
-        return found
+    def sides(self) -> Array:
+        """Return the sides across each patch's edge (n, 2, s, 3) of the spans there."""
+        of = self.of_patches
+        spans = self.spans.outer[of.patches[:, None], ACROSS[of.axes], of.sides]
+        return of.inward * spans[..., None, None]
+
+    def around(self, e: IntArray) -> tuple[IntArray, IntArray]:
+        """Return the patches' edges (k,) around edges e (m,), and the place (k,) in e of each."""
+        order = np.argsort(self._rank, kind="stable")
+        first, last = (np.searchsorted(self._rank[order], e, side=side) for side in SIDES)
+        places = np.repeat(np.arange(len(e)), last - first)
+        inside = np.arange(len(places)) - np.repeat(np.cumsum(last - first) - (last - first), last - first)
+        return order[first[places] + inside], places
 
     @cached_property
     def held(self) -> tuple[IntArray, Array]:

@@ -68,21 +68,23 @@ class Pieces:
 
     def _place(self, kind: str, text: str, e: IntArray, s: IntArray) -> SingularPlace:
         """Return the place of pieces, each around a sample."""
-        of, rows = self.edges.of_patches, self.edges.pairs[0][e, 0]
-        sizes, pieces = self.edges.sizes[e, s], of.along.shape[1]
+        of, (rows, places) = self.edges.of_patches, self.edges.around(e)
+        sides, pieces = self.edges.sides[rows, :, s[places]], of.along.shape[1]
+        shortest = np.full(len(e), np.inf)
+        np.minimum.at(shortest, places, np.linalg.norm(sides, axis=-1).min(axis=1))
         lengths = of.lengths[rows] / pieces
-        counts = np.ceil(lengths / (GAP * SPANS * sizes)).astype(np.int64)
-        counts = np.clip(counts, 1, max(1, _MOST // len(e)))
-        owners = np.repeat(np.arange(len(e)), counts)
+        counts = np.ceil(lengths / (GAP * SPANS * shortest[places])).astype(np.int64)
+        counts = np.clip(counts, 1, max(1, _MOST // len(rows)))
+        along = np.maximum(shortest[places], lengths / counts)[:, None] * of.tangents[rows, s[places]]
+        owners = np.repeat(np.arange(len(rows)), counts)
         inside = np.arange(len(owners)) - np.repeat(np.cumsum(counts) - counts, counts)
         shift = ((inside + 0.5) / counts[owners] - 0.5) / pieces
-        parameters, each = np.zeros((len(owners), 3)), np.arange(len(owners))
-        own = rows[owners]
-        other = ACROSS[of.axes[own]]
-        parameters[each[:, None], other] = of.sides[own]
-        parameters[each, of.axes[own]] = of.along[own, s[owners]] + shift
+        parameters, each, own = np.zeros((len(owners), 3)), np.arange(len(owners)), rows[owners]
+        parameters[each[:, None], ACROSS[of.axes[own]]] = of.sides[own]
+        parameters[each, of.axes[own]] = of.along[own, s[places[owners]]] + shift
         points = self.edges.body.points(of.patches[own], parameters)
-        return SingularPlace(kind, text, points, sizes[owners], float(self.edges.exponents[e, s].min()))
+        spans = np.stack([sides[:, 0], sides[:, 1], along], axis=-1)[owners]
+        return SingularPlace(kind, text, points, spans, float(self.edges.exponents[e, s].min()))
 
 
 def of_rim(supports: Supports, name: int) -> str:

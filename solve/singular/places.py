@@ -11,8 +11,10 @@ from scipy.spatial import cKDTree
 
 from parameterize.arrays import Array, Mask
 
-SPANS = 2.0  # radius around a singular place in which a gradient is no result, in spans there
-GAP = 0.5  # largest distance of two neighbouring points of a curve, as a share of the radius
+SPANS = 2.0  # around a singular place in which a gradient is no result
+GAP = 0.5  # largest distance of two neighbouring points of a curve, as a share of the shortest radius
+_FLAT = 0.5  # of the shortest span: the least radius of an ellipsoid, for spans that lie in one plane
+_NEAREST = 16  # points of curves whose ellipsoids are looked at
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,8 +29,8 @@ class SingularPlace:
         Where it is, as in "the rim of fix 'x < 1'".
     points : (m, 3) array
         Points on the curves, no farther apart than half the radius there.
-    spans : (m,) array
-        The size of the spans across the curve at each point.
+    spans : (m, 3, 3) array
+        Three sides of a span at each point, as columns.
     exponent : float
         The gradient grows as r^(exponent - 1), r the distance from the curve; the least one of all points.
 
@@ -50,8 +52,8 @@ class SingularPlace:
 
     @property
     def radius(self) -> float:
-        """Return the largest radius in which a gradient is no result."""
-        return SPANS * float(self.spans.max())
+        """Return the largest distance at which a gradient is no result."""
+        return SPANS * float(np.linalg.norm(self.spans, axis=1).max())
 
     def as_dict(self) -> dict[str, Any]:
         """Return the place for report.json, with one of its points."""
@@ -82,15 +84,24 @@ class SingularPlaces:
         return len(self.places)
 
     def is_near(self, points: ArrayLike, spans: float = SPANS) -> Mask:
-        """Return whether each of the points (m, 3) lies within so many spans of a singular place."""
+        """Return whether each of the points (m, 3) lies within so many spans of a singular place.
+
+        These are ellipsoids around its points, with as many spans in each direction: spans may be longer than wide.
+        """
         where = np.asarray(points, dtype=np.float64)
         if not self.places:
             return np.zeros(len(where), dtype=bool)
-        radii, found = spans * self._spans, np.zeros(len(where), dtype=bool)
+        farthest, found = spans * self._longest, np.zeros(len(where), dtype=bool)
         low, high = self._box
-        inside = np.flatnonzero(((where > low - radii.max()) & (where < high + radii.max())).all(axis=1))
-        distances, nearest = self._tree.query(where[inside], distance_upper_bound=radii.max())
-        found[inside] = distances < np.append(radii, 0.0)[nearest]
+        left = np.flatnonzero(((where > low - farthest) & (where < high + farthest)).all(axis=1))
+        count = min(_NEAREST, self._tree.n)
+        rank = np.arange(1, count + 1)
+        distances, nearest = map(np.asarray, self._tree.query(where[left], rank, distance_upper_bound=farthest))
+        for column in range(count):
+            own = np.flatnonzero(np.isfinite(distances[:, column]) & ~found[left])
+            at = nearest[own, column]
+            arms = np.einsum("mab,mb->ma", self._inverse[at], where[left[own]] - self._tree.data[at])
+            found[left[own]] = (arms**2).sum(axis=1) < spans**2
         return found
 
     @cached_property
@@ -103,5 +114,13 @@ class SingularPlaces:
         return cKDTree(np.concatenate([place.points for place in self.places]))
 
     @cached_property
-    def _spans(self) -> Array:
-        return np.concatenate([place.spans for place in self.places])
+    def _longest(self) -> float:
+        return max(place.radius for place in self.places) / SPANS
+
+    @cached_property
+    def _inverse(self) -> Array:
+        """Return the matrices (m, 3, 3) from arms in space to arms in spans."""
+        spans = np.concatenate([place.spans for place in self.places])
+        left, sizes, right = np.linalg.svd(spans)
+        sizes = np.maximum(sizes, _FLAT * np.linalg.norm(spans, axis=1).min(axis=1, keepdims=True))
+        return np.asarray(np.swapaxes(right, 1, 2) / sizes[:, None] @ np.swapaxes(left, 1, 2))

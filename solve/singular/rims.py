@@ -21,7 +21,7 @@ _BISECTIONS = 12
 
 @dataclass(frozen=True, eq=False)
 class Rim:
-    """Hold points (m, 3) of rims, the size (m,) of the spans there, and the number (m,) of the condition."""
+    """Hold points (m, 3) of rims, sides (m, 3, 3) of the spans there, and the number (m,) of the condition."""
 
     points: Array
     spans: Array
@@ -38,7 +38,7 @@ def rims_in_faces(body: Body, supports: Supports, breaks: Sequence[Sequence[Arra
     if len(faces) > _MANY:
         faces = faces[[len(np.unique(codes)) > 1 for codes in _sampled(body, supports, faces, _FIRST, _FIRST)]]
     counts = np.array([_counts(breaks, face) for face in faces.tolist()], dtype=np.int64).reshape(-1, 2)
-    parts = [Rim(np.zeros((0, 3)), np.zeros(0), np.zeros(0, dtype=np.int64))]
+    parts = [Rim(np.zeros((0, 3)), np.zeros((0, 3, 3)), np.zeros(0, dtype=np.int64))]
     for count in np.unique(counts, axis=0):
         own = faces[(counts == count).all(axis=1)]
         codes = _sampled(body, supports, own, int(count[0]), int(count[1]))
@@ -103,17 +103,16 @@ def _crossings(
     is_rim = np.linalg.norm(held[0] - held[1], axis=(-2, -1)) > differ
     changed = (before[0] ^ after[0])[is_rim]
     lowest = np.round(np.log2(np.maximum(changed & -changed, 1))).astype(np.int64)
-    sizes = _sizes(body, breaks, own[is_rim], low[is_rim])
-    return Rim(0.5 * (before[1] + after[1])[is_rim], sizes, lowest)
+    sides = _sides(body, breaks, own[is_rim], low[is_rim])
+    return Rim(0.5 * (before[1] + after[1])[is_rim], sides, lowest)
 
 
-def _sizes(body: Body, breaks: Sequence[Sequence[Array]], faces: IntArray, along: Array) -> Array:
-    """Return the size (m,) of the largest side of the span at parameters along faces."""
+def _sides(body: Body, breaks: Sequence[Sequence[Array]], faces: IntArray, along: Array) -> Array:
+    """Return the sides (m, 3, 3), columns, of the spans at parameters along faces."""
     parameters, patches = _parameters(faces, along), faces // len(FACE_NAMES)
     spans = np.empty((len(faces), 3))
     for row, (patch, place) in enumerate(zip(patches.tolist(), parameters, strict=True)):
         for a, own in enumerate(breaks[patch]):
             last = min(max(int(np.searchsorted(own, place[a], side="right")), 1), len(own) - 1)
             spans[row, a] = own[last] - own[last - 1]
-    sides = np.linalg.norm(body.jacobian(patches, parameters), axis=1) * spans
-    return np.asarray(sides.max(axis=1), dtype=np.float64)
+    return body.jacobian(patches, parameters) * spans[:, None]
