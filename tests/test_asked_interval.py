@@ -7,6 +7,7 @@ from cube_grids import glued, two
 import iga_nn
 from iga_nn import Elasticity, Poisson
 from solve import benchmark_volume
+from solve.asked import interval, raised
 
 
 def asked(body, problem, ask, **how):
@@ -46,11 +47,25 @@ def test_an_interval_holds_the_energy_at_a_reentrant_edge(degree):
         assert answer.upper - answer.value < 3.0 * abs(truth - answer.value)
 
 
-def test_hexahedra_of_one_span_have_no_ends_to_divide():
+def test_ends_are_not_divided_where_this_costs_much(monkeypatch):
+    monkeypatch.setattr(raised, "FEW", 0)
     bar = Elasticity(fix="p0_u0", load={"p1_u1": (0, 0, -1)})
     answer, reaction = asked(two(1, 2), bar, ["uz at (2, 0.5, 0.5)", "reaction z of p0_u0"])
     assert "solution of degree 3 adds" in answer.why
     assert reaction.value == pytest.approx(1.0) and reaction.width < 1e-6  # it balances the load
+
+
+def test_a_solution_that_is_even_across_one_span():
+    """Degree 3 adds nothing to u = z (1 - z) s(x, y) across one span that degree 2 does not have; half a span does."""
+    plate = iga_nn.BSplineVolume.from_function(lambda u, v, w: (u, v, w), (6, 6, 3), 2)
+    (answer,) = asked(plate, Poisson(exact="cos(3*(z-0.5))"), "u at (0.5, 0.5, 0.5)")
+    assert holds(answer, 1.0) and answer.value != pytest.approx(1.0, abs=1e-3)
+
+
+def test_a_peak_that_the_raised_solution_does_not_confirm(monkeypatch):
+    monkeypatch.setattr(interval, "CONFIRMED", 1e-6)
+    (answer,) = asked(benchmark_volume(2, 2), Poisson(exact="exp(x)*sin(y)+z"), "gradient_z max")
+    assert "does not confirm the solution's own" in answer.why and answer.value == pytest.approx(1.0, abs=0.02)
 
 
 def test_no_interval_is_explained():

@@ -32,7 +32,8 @@ def test_raised_knots_are_as_smooth_as_the_map_and_divide_the_ends():
         raised_knots(kink, 2, np.repeat([0, 0.5, 1], [4, 3, 4]), 3, False), [0] * 4 + [0.5] * 3 + [1] * 4
     )
     single = np.array([0.0, 0, 1, 1])
-    np.testing.assert_allclose(raised_knots(single, 1, single, 1, is_divided=True), [0] * 3 + [1] * 3)
+    np.testing.assert_allclose(raised_knots(single, 1, single, 1, is_divided=True), [0] * 3 + [0.5] + [1] * 3)
+    np.testing.assert_allclose(raised_knots(single, 1, single, 1, is_divided=False), [0] * 3 + [1] * 3)
 
 
 @pytest.mark.parametrize("body", [benchmark_volume(3, 2), two(2, 2)])

@@ -3,7 +3,7 @@
 What the raised solution adds to a solution is its error, but for the error of the raised solution itself. That is
 smaller by an order where the solution is smooth. Singular places are at edges of patches as a rule: at reentrant edges,
 where materials meet, and around held faces. There the degree alone helps little: half of the error is missing. So spans
-at the ends of patches of several spans are divided in two, and the outer half again, where this costs little.
+at the ends of patches are divided in two, and the outer half again, where this costs little; a single span is halved.
 """
 
 from collections import defaultdict
@@ -101,9 +101,7 @@ def _count(system: System, is_divided: bool) -> int:
 
 
 def affords_ends(system: System) -> bool:
-    """Return whether spans at the ends of patches are divided: where there are several, and it costs little."""
-    if all(len(row) == 2 for patch in system.stated for row in patch.space.whole.breaks):
-        return False
+    """Return whether spans at the ends of patches are divided: where it costs little."""
     return _count(system, is_divided=True) <= max(FEW, AFFORDED * _count(system, is_divided=False))
 
 
@@ -119,16 +117,18 @@ def raised_knots(knots: Array, degree: int, of_map: Array, map_degree: int, is_d
     """Return the knot vector of one degree more, from that of a space and that of its map.
 
     Where the map is smooth the space is smoother by one, so that there are hardly more functions. At the map's own
-    knots it is as smooth as the map: on one that is smoother errors are larger than before. A single span is not
-    divided.
+    knots it is as smooth as the map: on one that is smoother errors are larger than before. A single span is halved
+    where ends are divided: one degree more adds nothing to a solution that is even across it.
     """
     values, repeats = np.unique(knots, return_counts=True)
     for value, repeat in zip(*np.unique(of_map, return_counts=True), strict=True):
         repeats[values == value] = np.maximum(repeats[values == value], degree + 1 - map_degree + repeat)
     repeats[[0, -1]] = degree + 2
     row = np.repeat(values, repeats)
-    if len(values) == 2 or not is_divided:
+    if not is_divided:
         return row
+    if len(values) == 2:
+        return np.sort(np.append(row, values.mean()))
     first, last = values[1] - values[0], values[-1] - values[-2]
     ends = [(values[0] + share * first, values[-1] - share * last) for share in ENDS]
     return np.sort(np.append(row, ends))
