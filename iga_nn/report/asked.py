@@ -13,7 +13,8 @@ from .extremes import place_of
 
 HEAD = ("asked", "value", "between", "why")
 DIGITS = 2  # of half an interval's width, which the numbers show
-MOST_DIGITS = 12
+MOST_DIGITS = 5  # significant ones
+EXACT = 1e-6  # half of an interval over its value, below which only its size is told
 PLAIN = 5  # digits of a value without an interval
 MOST_SHARE = 10.0  # of half an interval in its value: a larger one says nothing
 
@@ -62,11 +63,12 @@ def _section(report: Report) -> dict[str, Any]:
 
 def _value(answer: Answer, section: dict[str, Any]) -> str:
     """Return the value with its unit, and its place where that was found."""
-    if answer["value"] is None:  # not a finite number
+    if answer["value"] is None or not math.isfinite(answer["value"]):
         return "–"
     digits = _decimals(answer)
     value = answer["value"]
-    shown = None if digits is None else max(digits, -_exponent(value))  # one digit at least
+    is_exact = digits is not None and _share(answer) < EXACT
+    shown = None if digits is None or is_exact else max(digits, -_exponent(value))  # one digit at least
     text = f"{value:.{PLAIN}g}" if shown is None else _rounded(value, shown, round)
     unit = _unit(answer, section)
     return f"{text} {unit}" if unit else text
@@ -77,12 +79,20 @@ def _interval(answer: Answer, section: dict[str, Any]) -> str:
     lower, upper = answer["lower"], answer["upper"]
     if lower is None or upper is None:
         return "no interval"
-    digits = _decimals(answer)
-    if digits is None:
-        return f"between {lower:.{PLAIN}g} and {upper:.{PLAIN}g}"
+    digits, width = _decimals(answer), _share(answer)
+    if digits is None or width == 0.0:
+        return "exact to rounding"
+    if width < EXACT:
+        return f"exact to {10.0 ** math.ceil(math.log10(width)):.0e}"
     ends = _rounded(lower, digits, math.floor), _rounded(upper, digits, math.ceil)
-    width = 0.5 * (upper - lower) / abs(answer["value"]) if answer["value"] else math.inf
-    return f"between {ends[0]} and {ends[1]}" + (f" (± {100.0 * width:.2g} %)" if width < MOST_SHARE else "")
+    percent = float(f"{100.0 * width:.2g}") if width < MOST_SHARE else math.inf
+    return f"between {ends[0]} and {ends[1]}" + (f" (± {percent:g} %)" if width < MOST_SHARE else "")
+
+
+def _share(answer: Answer) -> float:
+    """Return half of an interval over the size of its value; of zero it is infinite, or zero without a width."""
+    half = 0.5 * (answer["upper"] - answer["lower"])
+    return half / abs(answer["value"]) if answer["value"] else math.inf if half else 0.0
 
 
 def _remarks(answer: Answer, section: dict[str, Any]) -> list[str]:

@@ -126,7 +126,8 @@ def each_level(
         except MemoryError:
             remedy = "free some, lower --refine, or share the solve: mpiexec -n 4 iga-nn solve ... --mpi"
             raise InputError(f"refine {level}: the memory does not suffice; {remedy}") from None
-        log.info("solved, refined %d times: %s", level, str(solution.report).splitlines()[0])
+        lines = str(solution.report).splitlines()
+        log.info("solved, refined %d times: %s", level, lines[len(solution.answers)])
         yield solution
         if problem.form.components == 1:
             options = replace(options, start=solution)

@@ -45,7 +45,7 @@ def _outside(asked: Extreme, solution: Solution, places: SingularPlaces) -> Func
             return places.is_near(points, spans)
 
         pieces = asked.part.pieces(solution)
-        if any(not is_near(piece.group.maps.at(piece.rows, piece.places)).all() for piece in pieces):
+        if any(not is_near(piece.points).all() for piece in pieces):
             radius = share * max(place.radius for place in places)
             said = f"farther than {spans:g} spans ({radius:.3g}) from {_named(places)}, where it is infinite"
             return replace(_saying(asked, said), is_excluded=is_near)

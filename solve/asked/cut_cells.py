@@ -7,11 +7,12 @@ the part, the cell is first halved in all directions.
 """
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from parameterize.arrays import Array, IntArray, Mask
+from parameterize.arrays import Array, IntArray, Knots, Mask
+from parameterize.spline.bspline import breakpoints, divided_spans
 from parameterize.spline.spline_stack import SplineStack
 
 SAMPLES = 5  # points a direction at which the condition is evaluated in a span, its ends included
@@ -26,13 +27,32 @@ Holds = Callable[[Array], Mask]  # of points (3, m)
 Points = tuple[IntArray, Array, Array]  # patches (m,), parameters (m, 3) and weights (m,) in the parameters
 
 
-def points_inside(maps: SplineStack, breaks: Sequence[Array], holds: Holds, count: int) -> Iterator[Points]:
-    """Yield points of patches at which a condition holds. count: Gauss points a direction. breaks: of the spans."""
-    low, high = (np.meshgrid(*(row[side] for row in breaks), indexing="ij") for side in (slice(-1), slice(1, None)))
-    ends = np.stack([np.stack(side, axis=-1).reshape(-1, 3) for side in (low, high)], axis=1)  # (s, 2, 3)
-    owners, cells = np.repeat(np.arange(len(maps)), len(ends)), np.tile(ends, (len(maps), 1, 1))
-    samples = max(SAMPLES, math.ceil(FEWEST / len(cells) ** (1.0 / 3.0)))
-    yield from _in_cells(maps, owners, cells, holds, count, samples, HALVINGS)
+def spans_of(maps: SplineStack, knots: Knots, holds: Holds) -> tuple[Mask, Mask]:
+    """Return in which spans (k, s_u, s_v, s_w) of k patches a condition holds at all samples, and at some of them."""
+    breaks = [breakpoints(row) for row in knots]
+    cells = len(maps) * math.prod(len(row) - 1 for row in breaks)
+    pieces = max(SAMPLES, math.ceil(FEWEST / cells ** (1.0 / 3.0))) - 1
+    rows = [divided_spans(row, pieces) for row in knots]
+    x = np.moveaxis(maps.grid(*rows), -1, 0)  # (3, k, .., .., ..)
+    seen = np.asarray(holds(np.ascontiguousarray(x)))
+    every, some = seen, seen
+    for axis, row in enumerate(breaks, start=1):
+        places = np.arange(len(row) - 1)[:, None] * pieces + np.arange(pieces + 1)
+        every = np.take(every, places, axis=axis).all(axis=axis + 1)
+        some = np.take(some, places, axis=axis).any(axis=axis + 1)
+    return every, some
+
+
+def points_in(maps: SplineStack, knots: Knots, spans: Mask, holds: Holds, count: int) -> Iterator[Points]:
+    """Yield points at which a condition holds in the spans (k, s_u, s_v, s_w) that are cut.
+
+    count: Gauss points a direction.
+    """
+    owners, *places = np.nonzero(spans)
+    rows = [breakpoints(row) for row in knots]
+    ends = [[row[place + side] for row, place in zip(rows, places, strict=True)] for side in (0, 1)]
+    cells = np.stack([np.stack(side, axis=-1) for side in ends], axis=1)  # (n, 2, 3)
+    yield from _in_cells(maps, owners, cells, holds, count, SAMPLES, HALVINGS)
 
 
 def _in_cells(

@@ -21,7 +21,7 @@ from ..forms.form import Form, Quantity
 from ..forms.frame import UnitFrame
 from .linearised import joined, sampled
 from .named import demand_fit, dimension_of, energy_density, named
-from .parts import Part, Piece
+from .parts import Part, Piece, Scattered
 from .samples import Samples
 from .search import Excluded, extreme_inside, extreme_on_boundary
 from .supports import supports_in
@@ -87,7 +87,7 @@ class AtPlace(Functional):
     def _piece(self, solution: FieldOnBody) -> Piece:
         for group in self.part.groups(solution):
             if len(rows := np.flatnonzero(group.numbers == self.patch)):
-                return Piece(group, rows, self.parameters[None], np.ones(1))
+                return Scattered(group, rows, self.parameters[None], np.ones(1))
         raise AssertionError("every patch is in a group")
 
     def found(self, solution: FieldOnBody) -> tuple[float, Place | None]:
@@ -154,7 +154,7 @@ class Extreme(Functional):
         size = np.abs(np.linalg.det(at.group.maps.slopes_at(rows, places)))
         own = np.einsum("i,j,k->ijk", weights, weights, weights).ravel() * size
         own /= own.sum()
-        return sampled([(Piece(at.group, rows, places, own), own)], self.quantity_of)
+        return sampled([(Scattered(at.group, rows, places, own), own)], self.quantity_of)
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,7 +14,7 @@ from ..options import SolveOptions
 from ..solution import Solution
 from ..system import System
 from .away import away
-from .functional import Extreme, Functional, Reaction
+from .functional import AtPlace, Extreme, Functional
 from .geometry import GeometryPart
 from .of_geometry import of_geometry
 from .raised import Raised, why_not_raised
@@ -70,7 +70,8 @@ def answer(asked: Functional, solution: Solution, raised: Raised) -> Answer:
         parts = {"discretization": UNCONFIRMED * added, "iteration": ITERATION * added}
         return within(replace(higher, why=_why_unconfirmed(found, raised)), parts)
     around = 0.0
-    if not isinstance(asked, Reaction) and (samples := asked.samples(solution)) is not None:
+    if isinstance(asked, AtPlace | Extreme):
+        samples = asked.samples(solution)
         around = scatter(samples, solution, raised.solution)
     wider = WIDER if raised.is_divided else WIDER_AT_ENDS
     parts = {"discretization": wider * max(added, BY_CHANCE * around), "iteration": ITERATION * added}

@@ -8,7 +8,6 @@ from parameterize.arrays import Array
 
 from ..field import Points
 from ..forms.form import Quantity
-from ..quantities import at_places
 from .parts import Piece, QuantityOf
 from .samples import Samples
 
@@ -22,7 +21,7 @@ def sampled(pieces: list[tuple[Piece, Array]], quantity_of: QuantityOf) -> Sampl
 
 def _of_piece(piece: Piece, weights: Array, quantity_of: QuantityOf) -> Samples:
     rows = piece.form.components + piece.group.has_pressure
-    slopes = at_places(piece.group, slopes_of(quantity_of(piece.form)), piece.rows, piece.places) * weights
+    slopes = piece.values(lambda form: slopes_of(quantity_of(form))) * weights
     return Samples(piece.patches, piece.places, slopes[:rows], slopes[rows:].reshape(piece.form.components, 3, -1))
 
 
@@ -54,7 +53,7 @@ def slopes_of(quantity: Quantity) -> Quantity:
         def at(moved: Array) -> Array:
             points = x if pressure is None else _with_pressure(x, moved[ends[0]])
             found = np.asarray(quantity(moved[: ends[0]], moved[ends[-2] :].reshape(grad.shape), points))
-            return np.broadcast_to(found, (*found.shape[:-1], u.shape[-1])).reshape(-1)
+            return np.broadcast_to(found, (*found.shape[: found.ndim - u.ndim + 1], *u.shape[1:])).reshape(u.shape[1:])
 
         rows = []
         for i, step in enumerate(steps):

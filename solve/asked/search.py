@@ -15,7 +15,7 @@ from ..discretization.surface_rule import Faces
 from ..field import FieldOnBody
 from ..forms.region import FacesOfPoints, tolerance
 from ..quantities import extremes_of, samples_per_span
-from .parts import Part, Piece, QuantityOf
+from .parts import Part, Piece, QuantityOf, Scattered
 
 SAMPLES = 2**20  # of a search, where one a span is not more
 CANDIDATES = 8  # points around which places on faces are refined
@@ -58,7 +58,7 @@ def extreme_on_boundary(
     for piece in part.pieces(solution):
         values = sign * np.ravel(piece.values(quantity_of))
         if is_excluded is not None:
-            values = np.where(is_excluded(piece.group.maps.at(piece.rows, piece.places)), -np.inf, values)
+            values = np.where(is_excluded(piece.points), -np.inf, values)
         axis = int(np.argmin(np.ptp(piece.places, axis=0)))
         for k in np.argsort(-values, kind="stable")[:CANDIDATES].tolist():
             best.append((float(values[k]), piece, piece.places[k], axis))
@@ -99,7 +99,7 @@ def _zoomed(
             held = held & ~is_excluded(x.T)
         some = faces.parameters(around)[held]
         if len(some):
-            here = Piece(piece.group, np.full(len(some), piece.rows[0]), some, np.ones(len(some)))
+            here = Scattered(piece.group, np.full(len(some), piece.rows[0]), some, np.ones(len(some)))
             values = sign * np.ravel(here.values(quantity_of))
             if values.max() > value:
                 value, place = float(values.max()), some[values.argmax()]
