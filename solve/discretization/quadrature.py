@@ -158,7 +158,7 @@ def spline_rule(knots: Array, degree: int, exact: int) -> tuple[Array, Array]:
     return _cached_rule(tuple(knots.tolist()), degree, exact)
 
 
-@lru_cache(maxsize=64)
+@lru_cache(maxsize=1024)
 def _cached_rule(knots: tuple[float, ...], degree: int, exact: int) -> tuple[Array, Array]:
     row = np.array(knots)
     integrated = same_smoothness(row, degree - 1, exact)

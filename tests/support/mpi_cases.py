@@ -17,7 +17,7 @@ from rational_shapes import quarter_ring
 from volumes import mapped
 
 from parameterize.spline.volume import FACE_NAMES
-from solve import Elasticity, ExpressionError, Form, Poisson, Problem, benchmark_volume, solve_problem
+from solve import Elasticity, ExpressionError, Form, Grading, Poisson, Problem, benchmark_volume, solve_problem
 
 WAVE = "exp(x+z)*sin(y)"
 
@@ -55,6 +55,7 @@ def cases():
     bent = Elasticity(fix={"nx < -0.5 and y < 1.2": None}, load={"ny > 0.5": (1, 0, "x")}, spring={"nz < -0.5": "2"})
     two_values = Poisson(source="x", value={"nx > 0.5 and y > 0.7": "y"}, exchange={"nz > 0.5": ("2", "z")})
     faces = Poisson(source="1", value={"p0_u0": "y", "p7_v1": "x"}, exchange={"p3_w1": ("2", "1")})
+    graded = [Grading.of(own).refined({0: [3] + [0] * (n - 1)}) for own, n in ((n3, 3), (first, 1))]
     sheared = mapped(lambda u, v, w: (u + 3.0 * v, v, w + 1.5 * u))
     return {
         "poisson": (n4, Poisson(exact=WAVE), {"refine": 1}),
@@ -69,6 +70,8 @@ def cases():
         "held": (n4, held, {"tolerance": 1e-13, "degree": 2}),
         "cut": (n4, cut, {"tolerance": 1e-13}),
         "wind": (n3, Problem(Wind(), exact=WAVE), {}),
+        "graded": (n3, Poisson(exact=WAVE), {"grading": graded[0]}),
+        "graded plate": (first, Poisson(exact=WAVE), {"grading": graded[1], "tolerance": 1e-13}),
         "plate": (first, Poisson(exact=WAVE), {"refine": 1, "start": begun}),
         "plate with faces": (ring, faces, {"tolerance": 1e-13}),
         "plate with regions": (ring, two_values, {"tolerance": 1e-13}),
