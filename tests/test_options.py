@@ -18,7 +18,7 @@ from iga_nn.options import (
 from solve.study import benchmark_volume
 
 NOT_TOLD = {"unit", "stress_unit", "solve_anyway"}  # but to the reader, and to the run
-SPACE = {"refine": (2,), "degree": 2, "quadrature": "gauss", "ask": ("energy",)}
+SPACE = {"refine": (2,), "degree": 2, "quadrature": "gauss", "ask": ("energy",), "accuracy": "1%"}
 SCALAR = dict.fromkeys(("exact", "source", "boundary", "kappa", "reaction"), "1")
 VECTOR = dict.fromkeys(("exact", "body_force", "displacement"), "1;1;1")
 OTHERS = {
@@ -36,7 +36,7 @@ OTHERS = {
 
 def told(options):
     """What a solve is told of the options; `run` and `solve` ask for the same."""
-    return options.problem(), options.solve_options(), options.refine
+    return options.problem(), options.solve_options(), options.refine, options.wanted
 
 
 @pytest.mark.parametrize(("options", "others"), OTHERS.items(), ids=lambda given: getattr(given, "section", ""))

@@ -31,7 +31,7 @@ def test_an_edge_is_graded_with_the_rate_of_smooth_solutions():
     assert math.log(first.solution.report.l2 / last.solution.report.l2) / math.log(more) > 1.2
     row = np.diff(last.grading.rows[0])
     assert row.max() / row.min() > 50  # towards the edge
-    assert last.grading.spans[list(last.grading.spans).index(1)] == 1  # none along it
+    assert min(last.grading.spans) == first.grading.spans[2] == 2  # none along it
 
 
 def test_steps_say_their_numbers():
@@ -50,7 +50,7 @@ def test_steps_say_their_numbers():
 @pytest.mark.parametrize(
     ("how", "why"),
     [
-        ({"max_unknowns": 200}, "the limit of 200 unknowns"),
+        ({"max_unknowns": 300}, "the limit of 300 unknowns"),
         ({"time_limit": 1e-9}, "the limit of 1e-09 seconds"),
         ({"max_iterations": 1}, "the linear solver did not converge in 1 iterations"),
     ],

@@ -44,6 +44,8 @@ def verdict_in_words(outcome: Outcome) -> str:
     far, unsolved = reports.not_the_part(outcome.report), outcome.report.get("not_solved")
     found = asked.lines(outcome.report)
     lines = [f"{first:16s} {line}" for first, line in zip_longest(["asked"][: len(found)], found, fillvalue="")]
+    if refined := reports.solved(outcome.report).get("refinement"):
+        lines.append(f"accuracy         {reports.accuracy_in_words(refined)}")
     lines += [f"NOT THE PART     {far}"] if far else []
     lines += [f"NOT SOLVED       {unsolved}"] if unsolved else []
     measured = verdict.get("arap", {})

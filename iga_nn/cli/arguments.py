@@ -39,7 +39,7 @@ def with_values(argv: Sequence[str]) -> list[str]:
 
 
 # Options of a problem that a study has of its own, or lacks.
-OF_STUDY = ("refine", "degree", "quadrature", "ask", *UNITS)
+OF_STUDY = ("refine", "degree", "quadrature", "ask", "accuracy", *UNITS)
 
 
 def for_each_problem(group: App, *, is_default: bool = False, hidden: Sequence[str] = ()) -> Callable[[Any], Any]:

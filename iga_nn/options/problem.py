@@ -69,6 +69,8 @@ class ProblemOptions(Checked, ABC):
         ask: quantities to answer with intervals, which reports show first, each as "ux at (10, 0, 0)", "von_mises max
             over REGION", "mean T over REGION", "integral u", "reaction z of REGION", "flow over REGION" or "energy". A
             region that is a condition on position alone is a part of the body, any other a part of its boundary.
+        accuracy: refine where it counts, from the first level on, until half of every asked interval is less than this
+            share of its value, such as 2% or 0.02; without asks, until the estimated error in the energy norm is.
     """
 
     exact: Formula | None = None
@@ -79,6 +81,7 @@ class ProblemOptions(Checked, ABC):
     solve_anyway: bool = False
     unit: str | None = None
     ask: tuple[str, ...] = ()
+    accuracy: str | float | None = None
 
     section: ClassVar[str]  # its name on the command line and in report.json
     title: ClassVar[str]
@@ -140,6 +143,18 @@ class ProblemOptions(Checked, ABC):
             if text is not None and not (text.strip() and text.isprintable() and len(text) <= LONGEST_UNIT):
                 flag = "--" + name.replace("_", "-")
                 raise InputError(f"{flag} {text!r:.80}: give a short text such as mm, at most {LONGEST_UNIT} letters")
+        if self.accuracy is not None:
+            texts.share("--accuracy", self.accuracy)
+
+    @property
+    def wanted(self) -> float | None:
+        """Return the accuracy as a number, None where none is wanted."""
+        return None if self.accuracy is None else texts.share("--accuracy", self.accuracy)
+
+    @property
+    def levels(self) -> tuple[int, ...]:
+        """Return the levels that are solved on, coarsest first; where an accuracy is wanted, the first alone."""
+        return tuple(sorted(self.refine)) if self.accuracy is None else (min(self.refine),)
 
     @property
     def units(self) -> Units:
@@ -153,7 +168,7 @@ class ProblemOptions(Checked, ABC):
 
         with input_errors():
             return SolveOptions(
-                refine=max(self.refine), degree=self.degree, quadrature=self.quadrature, ask=asks_of(self.ask)
+                refine=max(self.levels), degree=self.degree, quadrature=self.quadrature, ask=asks_of(self.ask)
             )
 
 

@@ -100,3 +100,15 @@ def number(flag: str, text: str) -> float:
         return float(text)
     except ValueError:
         raise InputError(f"{flag} {text!r:.80}: give a number, or one a solid, such as 'steel: 1, pad: 2'") from None
+
+
+def share(flag: str, given: str | float) -> float:
+    """Return a share between 0 and 1 of a number, or of a text such as 2% or 0.02. Raises InputError for any other."""
+    text = str(given).strip()
+    try:
+        found = float(text.removesuffix("%")) / (100.0 if text.endswith("%") else 1.0)
+    except ValueError:
+        found = -1.0
+    if not 0.0 < found < 1.0:
+        raise InputError(f"{flag} {text!r:.80}: give a share such as 2% or 0.02")
+    return found

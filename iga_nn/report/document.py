@@ -206,6 +206,12 @@ def asked(report: Report) -> list[Report]:
     return next((section["asked"] for section in (solved(report), report.get("modes", {})) if "asked" in section), [])
 
 
+def accuracy_in_words(refined: Report) -> str:
+    """Return what became of the accuracy that was wanted of a solve."""
+    wanted, steps = f"{100.0 * refined['accuracy']:g} %", f"{refined['steps']} steps"
+    return f"{wanted} reached in {steps}" if refined["reached"] else f"{wanted} not reached: {refined['stopped']}"
+
+
 def one_to_one(report: Report) -> str:
     """Return whether the map is one-to-one: "yes", "no" or "undecided".
 

@@ -89,7 +89,7 @@ def _growth(known: Sequence[Level], section: dict[str, Any]) -> list[str]:
 
     Growth beside a place where it is infinite is known.
     """
-    for name, title in DERIVATIVES.items() if len(known) > 1 else ():
+    for name, title in DERIVATIVES.items() if len(known) > 1 and "graded" not in known[-1] else ():
         coarse, fine = known[-2:]
         if name not in coarse["extremes"] or name not in fine["extremes"] or fine["extremes"][name].get("beside"):
             continue

@@ -23,7 +23,7 @@ from parameterize.spline.volume import BSplineVolume
 from parameterize.surface.surface import Surface
 from solve.discretization.error_norms import POINTS
 from solve.discretization.roughness import rule_of
-from solve.discretization.space import trial_space
+from solve.discretization.space import Places, trial_space
 from solve.forms.boundary_value_problem import BoundaryValueProblem
 from solve.options import SolveOptions
 
@@ -188,13 +188,18 @@ class SolveMemory:
 
 def solve_memory(body: BodyLike, problem: BoundaryValueProblem, options: SolveOptions) -> SolveMemory:
     """Return the forecast for one solve: the sum over the patches of a body."""
-    parts = zip(as_body(body), problems_on(problem, body), strict=True)
-    found = [_patch_memory(patch, own, options) for patch, own in parts]
+    parts, grading = zip(as_body(body), problems_on(problem, body), strict=True), options.grading
+    found = [
+        _patch_memory(patch, own, options, None if grading is None else grading.places(number))
+        for number, (patch, own) in enumerate(parts)
+    ]
     return SolveMemory(sum(one.shared_mb for one in found), sum(one.each_mb for one in found))
 
 
-def _patch_memory(volume: BSplineVolume, problem: BoundaryValueProblem, options: SolveOptions) -> SolveMemory:
-    form, space = problem.form, trial_space(volume, options.refine, options.degree)
+def _patch_memory(
+    volume: BSplineVolume, problem: BoundaryValueProblem, options: SolveOptions, places: Places | None
+) -> SolveMemory:
+    form, space = problem.form, trial_space(volume, options.refine, options.degree, places=places)
     rule = rule_of(volume, space, problem.form.tensor, options.quadrature)
     points = float(np.prod(rule.shape, dtype=float))
     unknowns = float(form.components * space.dofs)

@@ -8,7 +8,7 @@ from typing import Any
 
 from parameterize.checkpoint import Checkpoints
 from parameterize.spline.body import BodyLike, as_body
-from solve import Answer, SolveReport
+from solve import Answer, Grading, SolveReport
 from solve.discretization.error_norms import Errors
 from solve.field import BodyField
 from solve.forms.boundary_value_problem import BoundaryValueProblem
@@ -31,12 +31,16 @@ class Levels:
     """Hold the levels that are done, coarsest first.
 
     refine: how many times each one halves the spans. entries: what report.json has of them. finest: the last solution.
+    grading: where an accuracy is wanted, the breakpoints of its space. refinement: how that ended, the section
+    `refinement` of report.json; empty before.
     """
 
     refine: list[int] = field(default_factory=list)
     entries: list[dict[str, Any]] = field(default_factory=list)
     reports: list[SolveReport] = field(default_factory=list)
     finest: Solution | None = None
+    grading: Grading | None = None
+    refinement: dict[str, Any] = field(default_factory=dict)
 
     def add(self, refine: int, entry: dict[str, Any], solution: Solution) -> None:
         """Add a level with its entry of report.json and its solution."""
@@ -49,8 +53,17 @@ class Levels:
         """Return in words which of the levels that were asked for are done, and which is missing; "" for none done."""
         if not self.refine:
             return ""
+        if self.grading is not None:
+            return f"{self.in_words} done, the accuracy is not reached"
         rest = sorted(asked)[len(self.refine) :]
-        return f"refine {_listed(self.refine)} is complete, refine {_listed(rest)} is missing"
+        return f"{self.in_words} is complete, refine {_listed(rest)} is missing"
+
+    @property
+    def in_words(self) -> str:
+        """Return which levels are done."""
+        if self.grading is None:
+            return f"refine {_listed(self.refine)}"
+        return f"{len(self.refine)} steps towards the accuracy"
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,6 +87,7 @@ class KeptLevels:
         state = {"asked": self._asked, "refine": done.refine, "entries": reports.plain(done.entries)}
         state |= {"reports": [reports.plain(asdict(report)) for report in done.reports]}
         state |= {"solution": digest(self.folder / SOLUTION)}
+        state |= {"grading": None if done.grading is None else done.grading.as_dict}
         self.checkpoints.save(_CHECKPOINT, {}, state)
 
     def load(self, body: BodyLike, problem: BoundaryValueProblem) -> Levels:
@@ -86,7 +100,9 @@ class KeptLevels:
             return Levels()
         _, state = saved
         refine = state["refine"]
-        if state["asked"] != self._asked or refine != sorted(self.problem_options.refine)[: len(refine)]:
+        levels = self.problem_options.levels
+        is_graded = self.problem_options.wanted is not None
+        if state["asked"] != self._asked or refine != [*levels, *levels * len(refine) * is_graded][: len(refine)]:
             log.info("the levels that are done are those of another problem: all are solved anew")
             return Levels()
         if state["solution"] != digest(self.folder / SOLUTION):
@@ -94,8 +110,9 @@ class KeptLevels:
             return Levels()
         found = [_report(values) for values in state["reports"]]
         finest = _loaded(self.folder / SOLUTION, body, found[-1], problem)
-        done = Levels(refine, state["entries"], found, finest)
-        log.info("refine %s: solved before the interruption", _listed(refine))
+        grading = Grading.from_dict(body, state["grading"]) if is_graded else None
+        done = Levels(refine, state["entries"], found, finest, grading)
+        log.info("%s: solved before the interruption", done.in_words)
         return done
 
 

@@ -204,7 +204,7 @@ def checked(mapping: MapOptions, problem_options: ProblemOptions) -> tuple[Bound
     """Return the problem of a run and its number of unknowns on the finest mesh. Raises InputError."""
     problem, degree = problem_options.problem(), mapping.config().spline.degree
     blank = BSplineVolume.uniform(np.zeros((mapping.most_control_points,) * 3 + (3,)), degree)
-    return problem, check_size(blank, max(problem_options.refine), problem_options.degree, problem.form.components)
+    return problem, check_size(blank, max(problem_options.levels), problem_options.degree, problem.form.components)
 
 
 def finished_run(
@@ -246,6 +246,8 @@ def solve_to(
     problem_options, path = problem_options or PoissonOptions(), Path(volume)
     if comm is not None and device != "cpu":
         raise InputError(f"device {device!r}: --mpi runs on the CPU; leave one of them out")
+    if comm is not None and problem_options.wanted is not None:
+        raise InputError("--accuracy refines in one process: leave --mpi out")
     problem, options = with_part(problem_options.problem(), problem_options.solve_options(), path)
     loaded, options = load_volume(path), replace(options, device=device, comm=comm)
     processes = 1 if comm is None else comm.size
@@ -272,7 +274,7 @@ def solve_to(
         if unsolved:
             return None if state is None else _finish(state, loaded)
         if state is None:
-            deque(each_level(loaded, problem, problem_options.refine, options), maxlen=0)
+            deque(each_level(loaded, problem, problem_options.levels, options), maxlen=0)
             return None
         solution = solve_levels(state, loaded, problem, problem_options, options)
         return _finish(state, loaded, solution, problem, problem_options.units)

@@ -22,6 +22,7 @@ from ..report import html
 from ..report.extremes import peak_notices
 from .levels import SOLUTION, KeptLevels, Levels
 from .output_folder import RunFolder
+from .refining import each_step, stopped_notice
 
 log = logging.getLogger(__name__)
 
@@ -42,7 +43,6 @@ def solve_levels(
     """
     options = replace(options, certified=verdict_of(state))
     done = kept.load(body, problem) if kept else Levels()
-    left = sorted(problem_options.refine)[len(done.refine) :]
     if done.refine:
         state.write(**{problem_options.section: section_of(problem_options, problem, body, done)})
     if problem.form.components == 1:
@@ -52,13 +52,14 @@ def solve_levels(
         return _show(state, body, done, problem, problem_options) if done.refine else ()
 
     with reported(state, body, lambda: done.missing(problem_options.refine), show), state.timed("solve"):
-        for level, solution in zip(left, each_level(body, problem, left, options), strict=True):
-            entry = level_of(solution)
+        for level, more, solution in _each(body, problem, problem_options, options, done):
+            entry = more | level_of(solution)
             solution.save(state.folder / SOLUTION)
             done.add(level, entry, solution)
             state.write(**{problem_options.section: section_of(problem_options, problem, body, done)})
             if kept and is_finite(solution):
                 kept.save(done)
+        state.write(**{problem_options.section: section_of(problem_options, problem, body, done)})
     for notice in _peaks(problem_options, problem, done):
         log.warning("%s", notice)
     _show(state, body, done, problem, problem_options)
@@ -66,17 +67,34 @@ def solve_levels(
     return done.finest
 
 
+def _each(
+    body: BodyLike, problem: BoundaryValueProblem, problem_options: ProblemOptions, options: SolveOptions, done: Levels
+) -> Iterator[tuple[int, dict[str, Any], Solution]]:
+    """Yield the levels that are left: how often spans are halved, what their entry has beside, and the solution."""
+    if problem_options.wanted is not None:
+        yield from each_step(body, problem, problem_options.wanted, options, done)
+        return
+    left = problem_options.levels[len(done.refine) :]
+    for level, solution in zip(left, each_level(body, problem, left, options), strict=True):
+        yield level, {}, solution
+
+
 def section_of(
     problem_options: ProblemOptions, problem: BoundaryValueProblem, body: BodyLike, done: Levels
 ) -> dict[str, Any]:
     """Return the section of report.json on a problem and the levels that are done."""
     known = problem_options.values("refine", "degree") | described(problem, body)
-    notices = [*notices_of(done.reports), *_peaks(problem_options, problem, done)]
+    notices = [
+        *stopped_notice(done.refinement),
+        *notices_of(done.reports[-1:] if done.grading else done.reports),
+        *_peaks(problem_options, problem, done),
+    ]
     asked = [answer.as_dict() for answer in done.reports[-1].asked]
     return (
         ({"asked": asked} if asked else {})
         | {name: value for name, value in known.items() if value is not None and value != ()}
         | ({"regions": regions_of(problem, done.reports[-1])} if problem.conditions else {})
+        | ({"refinement": done.refinement} if done.refinement else {})
         | {"levels": done.entries, "rates": rates(done.reports), "notices": notices}
     )
 

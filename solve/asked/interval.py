@@ -39,7 +39,13 @@ def answers(
     functionals = [away(one, solution) for one in functionals]
     if why := why_not_answered(system, solution):
         return tuple(replace(one.answer(solution), why=f"{NOT_ESTIMATED}: {why}") for one in functionals)
-    raised = Raised.of(system, solution, options)
+    return intervals(system, solution, functionals, Raised.of(system, solution, options))
+
+
+def intervals(
+    system: System, solution: Solution, functionals: Sequence[Functional], raised: Raised
+) -> tuple[Answer, ...]:
+    """Return the answers to quantities of a solution, with their intervals from its raised solution."""
     found = [answer(one, solution, raised) for one in functionals]
     return tuple(map(_with_geometry, found, of_geometry(system, solution, functionals)))
 

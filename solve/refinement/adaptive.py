@@ -20,6 +20,7 @@ from .loop import Limits, Refinement, Step
 ACCURACY = 0.02
 TOLERANCE = 1e-8  # of the linear solver, by default: asked quantities then have seven digits
 MOST_UNKNOWNS = 2_000_000
+FEW = 64  # patches: their single spans are halved at first, for one degree more tells nothing of what is even in one
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,4 +142,6 @@ def refinement_of(
     glued = as_body(body)
     functionals = [functional(ask, problem, glued) for ask in options.ask]
     grading = (options.grading or Grading.of(glued)).uniform(options.refine)
+    if len(glued) <= FEW:
+        grading = grading.refined({sheet: [count == 1] * count for sheet, count in enumerate(grading.spans)})
     return Refinement(glued, problem, replace(options, refine=0), grading, accuracy, functionals, limits)

@@ -19,8 +19,9 @@ from parameterize.spline.body import Body
 
 from ..answer import Answer
 from ..asked.adjoint import why_no_adjoint
+from ..asked.away import away
 from ..asked.functional import Functional
-from ..asked.interval import answer
+from ..asked.interval import intervals, within
 from ..asked.raised import Raised
 from ..discretization.grading import Grading
 from ..field import BodyField
@@ -36,6 +37,7 @@ from .marking import Spans, marked
 GROWTH = 2.0  # of the unknowns, a step: all solves together then cost about twice the last one
 LEAST_GROWTH = 1.2  # that is worth a step
 SAFETY = 0.5  # of what is allowed: the next step is to be the last one, though what it predicts is rough
+FREE = 4  # steps; then the radius around singular places stays, or largest values outside of it would grow for ever
 STALLED = 4  # steps without progress that end the refinement
 PROGRESS = 0.97  # of the least excess so far: less than this is progress
 MOST_EXCESS = 1e6
@@ -47,7 +49,7 @@ class Limits:
     """Hold what ends a refinement before its accuracy is reached.
 
     unknowns: the most of one solve. seconds: of the clock, of all steps. memory: returns in words what a solve lacks,
-    "" for nothing; it is asked before each solve.
+    "" for nothing; it is asked before each solve but the first.
     """
 
     unknowns: float = 2e6
@@ -79,7 +81,7 @@ class Step:
     >>> from solve import benchmark_volume
     >>> first = iga_nn.adaptive(benchmark_volume(1), iga_nn.Poisson(exact="x*y*z"), 0.01).steps[0]
     >>> first.grading.spans, first.excess == first.energy_error / 0.01
-    ((1, 1, 1), True)
+    ((2, 2, 2), True)
     """
 
     grading: Grading
@@ -94,7 +96,8 @@ class Refinement:
     """Refine a problem on a body step after step; `stopped` then says what ended it, "" for its accuracy.
 
     grading: of the first step. functionals: the quantities whose accuracy counts, none for the energy. start: where the
-    first solve starts, a solution on this grading or a coarser one. is_solved: whether it is the first step's.
+    first solve starts, a solution on this grading or a coarser one. is_solved: whether it is the solution of the first
+    step, until that step is yielded.
     """
 
     body: Body
@@ -108,21 +111,27 @@ class Refinement:
     is_solved: bool = False
     stopped: str = field(init=False, default="")
     _spans: Spans | None = field(init=False, default=None)
+    _asked: Sequence[Functional] = field(init=False, default=())
+    _count: int = field(init=False, default=0)  # of steps
 
     def steps(self) -> Iterator[Step]:
         """Yield each step as soon as it is done."""
         began, best, stalled = time.monotonic(), math.inf, 0
         while True:
             options = replace(self.options, refine=0, grading=self.grading, ask=())
-            self.stopped = self.limits.memory(options)
+            self.stopped = self.limits.memory(options) if self._count else ""
             if self.stopped:
                 return
             try:
                 step, finer = self._step(options)
             except MemoryError:
+                if not self._count:
+                    raise
                 self.stopped = "the memory does not suffice for the next step"
                 return
+            self._count += 1
             yield step
+            self.is_solved = False
             stalled = 0 if step.excess < PROGRESS * best else stalled + 1
             best = min(best, step.excess)
             if step.excess <= 1.0:
@@ -141,7 +150,12 @@ class Refinement:
         raised = Raised.of(system, solution, options)
         missed = _missed(system, raised.system, raised.solution)
         error = math.sqrt(_sum(missed) / max(_sum(_energy(system, raised.system, raised.solution)), TINY))
-        answers = tuple(answer(one, solution, raised) for one in self.functionals)
+        if self._count < FREE:
+            self._asked = [away(one, solution) for one in self.functionals]
+        answers = intervals(system, solution, self._asked, raised)
+        before = self.start.report.asked if self.start is not None and not self.is_solved else ()
+        if before:
+            answers = tuple(_changed(now, last) for now, last in zip(answers, before, strict=True))
         solution = replace(solution, report=replace(solution.report, asked=answers))
         excesses = [_excess(one, self.accuracy) for one in answers] or [error / self.accuracy]
         finer = self._finer(system, raised, missed, excesses)
@@ -152,7 +166,6 @@ class Refinement:
     def _solved(self, system: System, options: SolveOptions) -> Solution:
         """Return the solution, which starts at the last one; a solution that is there already is taken."""
         if self.is_solved:
-            self.is_solved = False
             assert self.start is not None
             return self.start
         start = self.start if self.problem.form.components == 1 else None  # as from level to level
@@ -179,22 +192,33 @@ class Refinement:
         """Return what the raised adjoint of a functional misses; None where that of the energy stands for it."""
         if not self.functionals or why_no_adjoint(system):
             return None
-        samples = self.functionals[number].samples(raised.solution)
+        samples = self._asked[number].samples(raised.solution)
         return None if samples is None else _missed(system, raised.system, raised.dual(samples))
 
     def _why_no_more(self, step: Step, finer: Grading, stalled: int, seconds: float) -> str:
         """Return why there is no further step; "" where there is one."""
         report, wanted = step.solution.report, GROWTH * sum(step.seconds.values())
         unknown = [one for one in report.asked if one.width is None]
+        far = [one for one in report.asked if one.parts.get("geometry", 0.0) > self.accuracy * abs(one.value)]
         reasons = {
             f"the linear solver did not converge in {report.iterations} iterations": not report.converged,
             f"{unknown[0].ask!r} has no interval: {unknown[0].why}" if unknown else "": bool(unknown),
+            f"{far[0].ask!r}: the distance to the true surface alone leaves more" if far else "": bool(far),
             f"no progress in {STALLED} steps, as where a quantity is infinite": stalled >= STALLED,
             f"the limit of {self.limits.unknowns:.0f} unknowns": report.dofs * LEAST_GROWTH > self.limits.unknowns,
             f"the limit of {self.limits.seconds:g} seconds": seconds + wanted > self.limits.seconds,
             "no span is left to halve": finer.spans == step.grading.spans,
         }
         return next((reason for reason, holds in reasons.items() if holds), "")
+
+
+def _changed(now: Answer, last: Answer) -> Answer:
+    """Return an answer whose interval holds half of what the last step changed: as much may still be missing."""
+    known = now.parts.get("discretization", math.inf)
+    change = 0.5 * abs(now.value - last.value)
+    if now.width is None or not change > known:
+        return now
+    return replace(within(now, {"discretization": change}), why=f"half of what the last step changed; {now.why}")
 
 
 def _missed(system: System, raised: System, found: BodyField) -> Elements:
