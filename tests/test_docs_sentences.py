@@ -11,6 +11,7 @@ MOST_WORDS = 30
 PAGES = (
     "docs/method.md",
     "docs/solver.md",
+    "docs/intervals.md",
     "docs/ways.md",
     "docs/blocks.md",
     "docs/sharp_edges.md",
