@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from parameterize.arrays import Array, IntArray, Mask, in_brackets
+from parameterize.quality.rotations import cofactors_and_determinants
 from parameterize.spline.bspline import breakpoints, divided_spans, evaluate_at, real_array
 from parameterize.spline.volume import UNITS, BSplineVolume
 
@@ -163,9 +164,13 @@ def _evaluated(quantity: Quantity, u: Array, slopes: Array, jacobian: Array, x: 
 
     Arguments and errors are those of `_found`.
     """
-    inverse = np.moveaxis(np.linalg.inv(np.moveaxis(jacobian, (0, 1), (-2, -1))), (-2, -1), (0, 1))
     slopes = slopes[:-1] if has_pressure else slopes
-    return _found(quantity, u, np.einsum("cb...,ba...->ca...", slopes, inverse), x, has_pressure)
+    cofactors, det = cofactors_and_determinants(np.ascontiguousarray(jacobian).reshape(3, 3, -1))
+    if not det.all():
+        raise np.linalg.LinAlgError("Singular matrix")
+    # grad_a = sum_b slope_b dU_b / dx_a, the inverse of J being the transposed cofactors over det J
+    grad = np.einsum("cbm,abm->cam", slopes.reshape(len(slopes), 3, -1), cofactors) / det
+    return _found(quantity, u, grad.reshape(slopes.shape), x, has_pressure)
 
 
 def _found(quantity: Quantity, u: Array, grad: Array, x: Points, has_pressure: bool) -> Array:

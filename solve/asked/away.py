@@ -47,7 +47,8 @@ def _outside(asked: Extreme, solution: Solution, places: SingularPlaces) -> Func
         pieces = asked.part.pieces(solution)
         if any(not is_near(piece.points).all() for piece in pieces):
             radius = share * max(place.radius for place in places)
-            said = f"farther than {spans:g} spans ({radius:.3g}) from {_named(places)}, where it is infinite"
+            unit = "span" if spans == 1.0 else "spans"
+            said = f"farther than {spans:g} {unit} (at most {radius:.3g}) from {_named(places)}, where it is infinite"
             return replace(_saying(asked, said), is_excluded=is_near)
     return _saying(asked, f"a number without meaning: all of the mesh there lies near to {_named(places)}")
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from parameterize.arrays import Array, IntArray, Mask, in_brackets
+from parameterize.quality.rotations import cofactors_and_determinants
 from parameterize.spline.body import Body, all_control_points
 from parameterize.spline.bspline import breakpoints, gauss_points
 
@@ -203,8 +204,9 @@ def _whole(group: FieldGroup, count: int, spans: Mask | None = None) -> Iterator
     step = count * max(1, POINTS // (len(v) * len(w) * len(group) * count))
     for start in range(0, len(u), step):
         here = slice(start, start + step)
-        size = np.abs(np.linalg.det(group.maps.grid_slopes(u[here], v, w)))
-        weights = np.einsum("i,j,k,nijk->nijk", a[here], b, c, size)
+        slopes = np.moveaxis(group.maps.grid_slopes(u[here], v, w), (-2, -1), (0, 1))
+        _, det = cofactors_and_determinants(np.ascontiguousarray(slopes).reshape(3, 3, -1))
+        weights = np.einsum("i,j,k,nijk->nijk", a[here], b, c, np.abs(det).reshape(slopes.shape[2:]))
         if spans is not None:
             own = spans[:, start // count : -(-(start + step) // count)]
             if not own.any():

@@ -11,6 +11,7 @@ from parameterize.spline.patch_groups import group_of
 from parameterize.spline.volume import FACE_NAMES
 
 from ..ask import Place
+from ..averaging import averaged_groups
 from ..discretization.surface_rule import Faces
 from ..field import FieldOnBody
 from ..forms.region import FacesOfPoints, tolerance
@@ -28,8 +29,11 @@ Found = tuple[float, Place, int, Array]  # value, point, patch and parameters (3
 def extreme_inside(
     part: Part, solution: FieldOnBody, quantity_of: QuantityOf, is_max: bool, is_excluded: Excluded | None
 ) -> Found:
-    """Return the largest or the smallest value in a part of the body. Raises ValueError where no sample lies there."""
-    groups = part.groups(solution)
+    """Return the largest or the smallest value in a part of the body, with gradients averaged where patches meet.
+
+    Raises ValueError where no sample lies there.
+    """
+    groups = averaged_groups(solution, part.body, part.problems)
     quantities = [[quantity_of(group.problem.form)] for group in groups if group.problem is not None]
 
     def inside(x: Any) -> Mask:
