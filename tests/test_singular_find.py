@@ -110,3 +110,10 @@ def test_is_near():
     assert places.is_near([[0.0, 0.0, 0.3], [1.9, 0.0, 0.0], [2.1, 0.0, 0.0]]).tolist() == [True, True, False]
     assert places.is_near([[1.9, 0.0, 0.0]], spans=1.0).tolist() == [False]
     assert not found(benchmark_volume(2), iga_nn.Poisson()).is_near([[0.0, 0.0, 0.0]]).any()
+
+
+def test_coefficients_that_are_fields_or_differ_between_solids(rods):
+    kappa = iga_nn.solve(rods, iga_nn.Poisson(exact="4+x")).field
+    assert not len(iga_nn.solve(rods, iga_nn.Poisson(source="1", boundary="0", kappa=kappa)).singular)
+    varied = iga_nn.Poisson(source="1", boundary="0", kappa={"a": "1+x*x", "b": lambda x, y, z: 2.0 + 0.0 * x})
+    assert not len(found(rods, varied))

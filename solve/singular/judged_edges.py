@@ -11,6 +11,7 @@ import numpy as np
 from parameterize.arrays import Array, IntArray, Mask
 from parameterize.spline.body import Body
 
+from ..field import Points
 from ..forms.boundary_value_problem import BoundaryValueProblem
 from ..forms.elasticity import Elasticity
 from .edges import ACROSS, INSET, PatchEdges, across, edges_of, outward
@@ -119,6 +120,9 @@ class JudgedEdges:
     def _coefficients(self) -> Array:
         """Return shear modulus and Poisson's ratio (n, 2) at patches' edges, of scalar laws the factor and 0."""
         of, found = self.of_patches, np.ones((len(self.of_patches.patches), 2))
+        middle, parameters = of.points.shape[1] // 2, np.zeros((len(found), 3))
+        np.put_along_axis(parameters, ACROSS[of.axes], of.sides.astype(np.float64), axis=1)
+        np.put_along_axis(parameters, of.axes[:, None], of.along[:, middle, None], axis=1)
         kinds: dict[Any, list[int]] = defaultdict(list)
         for row, patch in enumerate(of.patches.tolist()):
             kinds[self.problems[patch].in_volume].append(row)
@@ -128,7 +132,7 @@ class JudgedEdges:
                 lam, mu = form.constants
                 found[rows] = mu, 0.5 * lam / (lam + mu)
             elif len(kinds) > 1:
-                x = np.ascontiguousarray(of.points[rows, of.points.shape[1] // 2].T)
+                x = Points.at(np.ascontiguousarray(of.points[rows, middle].T), parameters[rows])
                 found[rows] = np.stack([form.tensor(x)[[0, 3, 5]].mean(axis=0), np.zeros(len(rows))], axis=1)
         return found
 
