@@ -55,6 +55,13 @@ def test_ends_are_not_divided_where_this_costs_much(monkeypatch):
     assert reaction.value == pytest.approx(1.0) and reaction.width < 1e-6  # it balances the load
 
 
+def test_a_held_region_that_ends_inside_of_a_face_widens():
+    for region, wider in (("x < 1e-6", "1.5 times"), ("x < 1e-6 and y < 0.4", "4 times")):
+        problem = Poisson(source="1", conditions=[iga_nn.Value(region)])
+        (answer,) = asked(two(2, 2), problem, "u at (1.2, 0.5, 0.5)")
+        assert answer.why.startswith(wider) and ("inside of a face" in answer.why) == (wider == "4 times")
+
+
 def test_a_solution_that_is_even_across_one_span():
     """Degree 3 adds nothing to u = z (1 - z) s(x, y) across one span that degree 2 does not have; half a span does."""
     plate = iga_nn.BSplineVolume.from_function(lambda u, v, w: (u, v, w), (6, 6, 3), 2)

@@ -23,7 +23,8 @@ from .scatter import scatter
 # Half of an interval over what the raised solution adds (examples/benchmarks/effectivity.py). Where ends of patches are
 # not divided, a singular solution's error is up to twice what is added. Energies and reactions are sums over the body:
 # they have no place around which errors are seen, and were up to 1.4 times as wrong (examples/benchmarks/textbook.py).
-WIDER, WIDER_AT_ENDS, WIDER_OF_SUMS = 1.5, 2.0, 2.0
+# A held region that ends inside of a face has a rim where nothing is divided: a third of the error was seen.
+WIDER, WIDER_AT_ENDS, WIDER_OF_SUMS, WIDER_AT_RIMS = 1.5, 2.0, 2.0, 4.0
 # A largest value that the raised solution does not confirm is a peak at a place of bad shape as a rule: 134 at a corner
 # of a hexahedron, in the raised solution 66 at another place. Then the raised solution's value is the answer.
 CONFIRMED = 0.2  # largest difference, as a share of the larger value
@@ -105,6 +106,8 @@ def _degree(raised: Raised) -> int:
 
 def _wider(asked: Functional, raised: Raised) -> float:
     """Return half of an interval over what the raised solution adds."""
+    if raised.has_inner_rim:
+        return WIDER_AT_RIMS
     if not raised.is_divided:
         return WIDER_AT_ENDS
     return WIDER_OF_SUMS if isinstance(asked, Reaction) or asked.ask.kind == "energy" else WIDER
@@ -113,4 +116,5 @@ def _wider(asked: Functional, raised: Raised) -> float:
 def _why(wider: float, raised: Raised) -> str:
     """Return in words what an interval rests on."""
     finer = " and finer at the ends of patches" if raised.is_divided else ""
-    return f"{wider:g} times what a solution of degree {_degree(raised)}{finer} adds"
+    slow = ", for a held region ends inside of a face, where convergence is slow" if raised.has_inner_rim else ""
+    return f"{wider:g} times what a solution of degree {_degree(raised)}{finer} adds{slow}"

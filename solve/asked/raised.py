@@ -9,6 +9,7 @@ at the ends of patches are divided in two, and the outer half again, where this 
 from collections import defaultdict
 from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -19,6 +20,7 @@ from parameterize.spline.volume import BSplineVolume
 
 from ..discretization.slab import shared_space
 from ..discretization.space import MOST_DEGREE, TrialSpace, of_each
+from ..discretization.weak import WeakFace
 from ..field import BodyField
 from ..linear.nodal import nodes
 from ..mixed import MixedSystem, build_mixed
@@ -34,6 +36,7 @@ LEFT_OF_GIVEN = 0.002  # where values are given: the start does not have those o
 ENDS = (0.25, 0.5)  # where a span at the end of a patch is divided
 AFFORDED = 1.5  # times as many coefficients as without divided ends
 FEW = 20_000  # coefficients of a component that are always afforded
+SLIVER = 1e-3  # of the largest held area: what is less lies beside the border of a face
 MOST = 5_000_000  # coefficients of all components
 
 
@@ -63,6 +66,15 @@ class Raised:
         found = higher.continued(start_in(higher, solution), left, options)
         report = replace(found.report, balance=evened(found.report.balance))
         return cls(higher, replace(found, report=report), is_divided)
+
+    @cached_property
+    def has_inner_rim(self) -> bool:
+        """Return whether a region that is held ends inside of a patch's face; slivers of a region do not count."""
+        shared, weak = self.system.unknowns.processes.shared, self.system.matrix.weak
+        areas = [_held_areas(face) for face in weak]
+        largest = max(shared(max((float(own.max()) for own in areas), default=0.0)))
+        pairs = zip(areas, weak, strict=True)
+        return any(shared(any(bool(((own > SLIVER * largest) & ~face.is_whole).any()) for own, face in pairs)))
 
     def dual(self, samples: Samples) -> BodyField:
         """Return the adjoint of a functional in the raised space."""
@@ -132,6 +144,13 @@ def raised_knots(knots: Array, degree: int, of_map: Array, map_degree: int, is_d
     first, last = values[1] - values[0], values[-1] - values[-2]
     ends = [(values[0] + share * first, values[-1] - share * last) for share in ENDS]
     return np.sort(np.append(row, ends))
+
+
+def _held_areas(face: WeakFace) -> Array:
+    """Return the area (k,) on which something is held of each patch's face."""
+    held = face.gamma > 0.0
+    found = np.bincount(face.owners[held], face.weights[held], minlength=len(face.patches))
+    return found.astype(np.float64, copy=False)  # whole numbers where there are no points
 
 
 def evened(balance: Balance | None) -> Balance | None:
