@@ -59,8 +59,17 @@ def _adjoint(system: System, solution: Solution, own: OwnChange) -> BodyField | 
         return "the quantity has no value"
     if isinstance(own.functional, Reaction):
         return _of_reaction(system, own.functional)
+    if own.functional.ask.kind == "energy" and own.functional.ask.region is None and _does_no_work(system):
+        return solution.field  # a(v, z) = a(u, v) for all v
     samples = own.functional.samples(solution)
     return "the quantity has no linearisation" if samples is None else adjoint(system, samples)
+
+
+def _does_no_work(system: System) -> bool:
+    """Return whether supports do no work: all given values are zero, and no exchange takes a part of the energy."""
+    patches = [patch.problem for patch in system.stated]
+    exchanges = any(one.factor is not None for own in patches for one in (*own.conditions, *own.faces))
+    return not system.has_given_values and not exchanges
 
 
 def _of_reaction(system: System, reaction: Reaction) -> BodyField | str:
