@@ -40,12 +40,13 @@ class GeometryPart:
 
     change: J on the true body minus J on the spline's, to first order. spread: the root of the sum over the spans of
     the boundary of the squares of what each changes: it is large where large changes cancel, as around a place on the
-    boundary. distance: the largest one along a normal.
+    boundary. distance: the largest one along a normal. wider: a factor of the part.
     """
 
     change: float
     spread: float
     distance: float
+    wider: float = 1.0
 
     @property
     def part(self) -> float:
@@ -53,7 +54,7 @@ class GeometryPart:
 
         On a hollow cylinder the change was right to 10 %; the sum without signs was up to 50 times as large.
         """
-        return hypot(self.change, self.spread)
+        return self.wider * hypot(self.change, self.spread)
 
 
 def geometry_parts(
