@@ -47,6 +47,7 @@ def runs(full: bool) -> dict[str, Callable[[], Path]]:
         "elasticity": lambda: module("elasticity").main(),
         "rational_ring": lambda: module("rational_ring").main(),
         "l_shape": lambda: module("l_shape").main(),
+        "graded_spans": lambda: module("graded_spans").main(),
         "plate_with_hole": lambda: module("plate_with_hole").main(),
         "pulled_ring": lambda: module("pulled_ring").main(),
         "bracket": lambda: module("bracket").main(),

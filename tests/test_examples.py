@@ -125,6 +125,15 @@ def test_an_edge_that_points_inward_limits_the_rate(tmp_path, capsys):
     assert rates[1] == pytest.approx(4.0 / 3.0, abs=0.15) and rates[3] > 3.8
 
 
+def test_graded_spans_bring_the_rate_back(tmp_path, capsys):
+    assert shown(load("graded_spans").main(out=tmp_path, accuracy=0.01, levels=3))
+    out = capsys.readouterr().out
+    rows = re.findall(r"(uniform|graded) +(\d+) unknowns, relative L2 error (\S+)", out)
+    last = {name: (int(count), float(error)) for name, count, error in rows}
+    assert last["graded"][0] < last["uniform"][0] and last["graded"][1] < last["uniform"][1]
+    assert "accuracy 1 % reached" in out
+
+
 def test_a_plate_with_a_hole_has_three_times_the_stress(tmp_path, capsys):
     assert shown(load("plate_with_hole").main(out=tmp_path))
     top, side = re.findall(r"(-?[\d.]+) at its", capsys.readouterr().out)
