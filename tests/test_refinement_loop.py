@@ -76,3 +76,12 @@ def test_a_goal_far_from_the_edge_needs_fewer_unknowns_than_the_energy():
 def test_an_accuracy_is_a_number_between_0_and_1(accuracy):
     with pytest.raises(ValueError, match="accuracy must be a number between 0 and 1"):
         iga_nn.adaptive(benchmark_volume(1), Poisson(), accuracy)
+
+
+def test_a_space_without_a_raised_one_ends_the_refinement(monkeypatch):
+    problem = Poisson(exact=around_an_edge, source="0", boundary=around_an_edge)
+    monkeypatch.setattr("solve.asked.raised.MOST", 1500)
+    found = iga_nn.adaptive(l_shape(), problem, 1e-6, degree=2)
+    assert found.stopped.startswith("the error is not estimated: the raised space has") and len(found.steps) > 1
+    with pytest.raises(ValueError, match="the error is not estimated"):
+        iga_nn.adaptive(l_shape(), problem, 0.1, degree=2, refine=4)

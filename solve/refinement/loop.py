@@ -22,7 +22,7 @@ from ..asked.adjoint import why_no_adjoint
 from ..asked.away import away
 from ..asked.functional import Functional
 from ..asked.interval import intervals, within
-from ..asked.raised import Raised
+from ..asked.raised import Raised, why_not_raised
 from ..discretization.grading import Grading
 from ..field import BodyField
 from ..forms.boundary_value_problem import BoundaryValueProblem
@@ -42,6 +42,10 @@ STALLED = 4  # steps without progress that end the refinement
 PROGRESS = 0.97  # of the least excess so far: less than this is progress
 MOST_EXCESS = 1e6
 TINY = 1e-300
+
+
+class _NotEstimatedError(ValueError):
+    """A space that has no raised space."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -129,6 +133,11 @@ class Refinement:
                     raise
                 self.stopped = "the memory does not suffice for the next step"
                 return
+            except _NotEstimatedError as error:
+                if not self._count:
+                    raise
+                self.stopped = str(error)
+                return
             self._count += 1
             yield step
             self.is_solved = False
@@ -145,6 +154,8 @@ class Refinement:
         """Return a step and the grading of the next one."""
         clock = [time.monotonic()]
         system = discretized(self.body, self.problem, options)
+        if why := why_not_raised(system):
+            raise _NotEstimatedError(f"the error is not estimated: {why}")
         solution = self._solved(system, options)
         clock.append(time.monotonic())
         raised = Raised.of(system, solution, options)
