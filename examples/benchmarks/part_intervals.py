@@ -30,7 +30,6 @@ from solve.asked.functional import functional
 
 TABLE_HEAD = (*HEAD[:5], "finer", *HEAD[6:])
 PRICE_HEAD = ("part", "unknowns", "seconds of the solve", "of asks beside it", "finer: degree, level", "unknowns", "s")
-TOLERANCE = 1e-8  # of the linear solver: far below the intervals
 
 
 @dataclass(frozen=True)
@@ -74,7 +73,7 @@ def timed(
 ) -> tuple[Solution, float]:
     """Return a solution, and its CPU seconds."""
     start = time.process_time()
-    options = {"tolerance": TOLERANCE, "ask": asks} | more
+    options = {"ask": asks} | more
     solution = iga_nn.solve(volume, part.problem, degree=degree, refine=refine, **options)
     return solution, time.process_time() - start
 

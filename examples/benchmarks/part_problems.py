@@ -6,6 +6,7 @@ The parts are those of `parts.py`, by set and name. Places are points of the par
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import iga_nn
 
@@ -40,29 +41,6 @@ def pocketed(
     return PartProblem(f"cad_mfcad_{name}", problem, asks, finer=finer)
 
 
-def bracket() -> PartProblem:
-    """Return the bracket, held at its wall and loaded at the end of its other leg."""
-    end = "nx > 0.99 and x > 59.9"
-    problem = iga_nn.Elasticity(**STEEL, fix="nx < -0.99 and x < 0.01", load={end: (0.0, 0.0, -1.0)})
-    asks = (f"mean uz over {end}", "uz at (60, 20, 6)", "mean von_mises over nz > 0.99")
-    return PartProblem("parts_bracket", problem, asks)
-
-
-def sheet() -> PartProblem:
-    """Return the bent sheet, held at one end and loaded at its edge."""
-    problem = iga_nn.Elasticity(**STEEL, fix="nx < -0.99 and x < 0.01", body_force=(0.0, 0.0, -0.01))
-    return PartProblem("parts_sheet", problem, ("min uz", "mean uz over nz > 0.99"))
-
-
-def flange() -> PartProblem:
-    """Return the flange, held in its six holes, under a pressure on its hub."""
-    holes = "abs(nz) < 0.5 and x*x + y*y > 41*41 and x*x + y*y < 54*54"
-    hub = "nx*x + ny*y > 30 and x*x + y*y < 1300 and z > 12.01"
-    problem = iga_nn.Elasticity(**STEEL, fix=holes, pressure={hub: 10.0})
-    asks = ("max magnitude", f"mean uz over {hub}", "mean von_mises over nz > 0.99 and z > 51")
-    return PartProblem("parts_flange", problem, asks, finer=(4, 0))
-
-
 def heatsink() -> PartProblem:
     """Return the heat sink, heated at its bottom; the rest gives heat to the air."""
     air = "z > 0.001 and nz > -0.99"
@@ -72,14 +50,6 @@ def heatsink() -> PartProblem:
     return PartProblem(
         "parts_heatsink", problem, ("max T", "min T", "mean T over nz < -0.99", "T at (30, 25, 5)"), finer=(2, 2)
     )
-
-
-def void() -> PartProblem:
-    """Return the box with a hollow ball inside, pressed on its top."""
-    top = "nz > 0.99 and z > 19.9"
-    problem = iga_nn.Elasticity(**STEEL, fix="nz < -0.99 and z < -19.9", load={top: (0.0, 0.0, -10.0)})
-    asks = (f"mean uz over {top}", "uz at (20, 20, 20)", "mean von_mises over nx > 0.99")
-    return PartProblem("parts_void", problem, asks)
 
 
 def two() -> PartProblem:
@@ -92,17 +62,8 @@ def two() -> PartProblem:
         fix="nz < -0.99",
         load={top: (1.0, 0.0, 0.0)},
     )
-    asks = (f"mean ux over {top}", "ux at (50, 10, 10)", "von_mises max over abs(z) < 4", "energy")
+    asks = (f"mean ux over {top}", "ux at (50, 10, 10)", "mean von_mises over nx > 0.99", "energy")
     return PartProblem("parts_two", problem, asks, finer=(2, 2))
-
-
-def filleted() -> PartProblem:
-    """Return the block with rounded edges, held at one end and pulled at the other."""
-    end = "nx > 0.99"
-    problem = iga_nn.Elasticity(**STEEL, fix="nx < -0.99", load={end: (10.0, 0.0, 0.0)})
-    return PartProblem(
-        "parts_filleted", problem, (f"mean ux over {end}", "mean von_mises over nz > 0.99"), 1, 0, (2, 0)
-    )
 
 
 def ball() -> PartProblem:
@@ -138,31 +99,37 @@ def octahedron() -> PartProblem:
     return PartProblem("cad_n14o_octahedron", problem, ("T at (0, 0, 0)", "mean T", "max T", "energy"))
 
 
-def torus() -> PartProblem:
-    """Return the quarter of a torus with its cylinders, held at one end and pushed at the other."""
-    end = "ny < -0.99 and y < 0.01"
-    problem = iga_nn.Elasticity(**STEEL, fix="nx < -0.99 and x < 0.01", load={end: (1.0, 0.0, 0.0)})
-    asks = (f"mean ux over {end}", "ux at (2.5, 0, 0)", "mean von_mises over nz > 0.99")
-    return PartProblem("cad_n10o_qtorus_cyl", problem, asks)
-
-
-def fork() -> PartProblem:
-    """Return a machined part of MAMBO on its foot, pushed on its side."""
-    side = "ny > 0.99 and y > 39.9"
-    problem = iga_nn.Elasticity(**STEEL, fix="nz < -0.99 and z < -7.9", load={side: (0.0, -1.0, 0.0)})
-    return PartProblem("cad_i10o_simp", problem, (f"mean uy over {side}", "mean von_mises over ny < -0.99"))
+def warmed(label: str, cold: str, heated: str, asks: tuple[str, ...], **how: Any) -> PartProblem:
+    """Return a part that is cold on one region, and heated on another."""
+    problem = iga_nn.Poisson(source=0.0, conditions=[iga_nn.Value(cold, 0.0), iga_nn.Flux(heated, 1.0)])
+    return PartProblem(label, problem, (f"mean T over {heated}", *asks), **how)
 
 
 def every() -> list[PartProblem]:
     """Return the twenty parts, those of an engineer first."""
     pushed, turned = (10.0, 0.0, 0.0), (0.0, 5.0, -10.0)
+    bottom, top = "nz < -0.99 and z < 0.01", f"nz > 0.99 and z > {BOX - 0.01}"
+    holes = "abs(nz) < 0.5 and x*x + y*y > 41*41 and x*x + y*y < 54*54"
+    hub = "nx*x + ny*y > 30 and x*x + y*y < 1300 and z > 12.01"
+    engineers = [
+        warmed("parts_bracket", "nx < -0.99 and x < 0.01", "nx > 0.99 and x > 59.9", ("T at (60, 20, 6)", "mean T")),
+        warmed("parts_filleted", "nx < -0.99", "nx > 0.99", ("T at (20, 0, 0)",), degree=1, finer=(2, 0)),
+        warmed("parts_sheet", "nx < -0.99 and x < 0.01", "nz > 0.99", ("max T", "mean T")),
+        two(),
+        warmed("parts_void", "nz < -0.99 and z < -19.9", "nz > 0.99 and z > 19.9", ("T at (20, 20, 20)", "mean T")),
+        heatsink(),
+        warmed("parts_flange", holes, hub, ("max T", "mean T"), finer=(4, 0)),
+    ]
     boxes = [
         pocketed("0-0-4-4-19", (10, 10, 10), pushed),
         pocketed("0-0-8-9-19", (5, 5, 10), turned, (4, 0)),
         pocketed("0-0-4-13-19", (10, 10, 10), turned),
-        pocketed("0-0-1-10-11-23", (10, 10, 10), pushed, (4, 0)),
         pocketed("0-0-4-7-12-23", (10, 10, 10), pushed),
-        pocketed("0-10-11-14-19", (10, 10, 10), turned),
+        warmed("cad_mfcad_0-0-1-10-11-23", bottom, top, ("T at (10, 10, 10)", "mean T"), finer=(4, 0)),
+        warmed("cad_mfcad_0-10-11-14-19", bottom, top, ("T at (10, 10, 10)", "mean T")),
     ]
-    engineers = [bracket(), filleted(), sheet(), two(), void(), heatsink(), flange()]
-    return [*engineers, ball(), scooped(), pyramid(), wedge(), octahedron(), torus(), fork(), *boxes]
+    others = [
+        warmed("cad_n10o_qtorus_cyl", "nx < -0.99 and x < 0.01", "ny < -0.99 and y < 0.01", ("max T", "mean T")),
+        warmed("cad_i10o_simp", "nz < -0.99 and z < -7.9", "ny > 0.99 and y > 39.9", ("max T", "mean T")),
+    ]
+    return [*engineers, ball(), scooped(), pyramid(), wedge(), octahedron(), *others, *boxes]
