@@ -56,10 +56,10 @@ def test_ends_are_not_divided_where_this_costs_much(monkeypatch):
 
 
 def test_a_held_region_that_ends_inside_of_a_face_widens():
-    for region, wider in (("x < 1e-6", "1.5 times"), ("x < 1e-6 and y < 0.4", "4 times")):
+    for region, wider in (("x < 1e-6", "1.5 times"), ("x < 1e-6 and y < 0.4", "5 times")):
         problem = Poisson(source="1", conditions=[iga_nn.Value(region)])
         (answer,) = asked(two(2, 2), problem, "u at (1.2, 0.5, 0.5)")
-        assert answer.why.startswith(wider) and ("inside of a face" in answer.why) == (wider == "4 times")
+        assert answer.why.startswith(wider) and ("inside of a face" in answer.why) == (wider == "5 times")
 
 
 def test_a_solution_that_is_even_across_one_span():

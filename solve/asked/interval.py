@@ -21,10 +21,11 @@ from .raised import Raised, why_not_raised
 from .scatter import scatter
 
 # Half of an interval over what the raised solution adds (examples/benchmarks/effectivity.py). Where ends of patches are
-# not divided, a singular solution's error is up to twice what is added. Energies and reactions are sums over the body:
-# they have no place around which errors are seen, and were up to 1.4 times as wrong (examples/benchmarks/textbook.py).
-# A held region that ends inside of a face has a rim where nothing is divided: a third of the error was seen.
-WIDER, WIDER_AT_ENDS, WIDER_OF_SUMS, WIDER_AT_RIMS = 1.5, 2.0, 2.0, 4.0
+# not divided, a singular solution's error is 2.1 times what is added on a heat sink. Energies and reactions are sums
+# over the body: they have no place around which errors are seen, and were up to 1.4 times as wrong
+# (examples/benchmarks/textbook.py). A held region that ends inside of a face has a rim where nothing is divided: a
+# fifth of the error was seen on a wedge (examples/benchmarks/part_intervals.py).
+WIDER, WIDER_AT_ENDS, WIDER_OF_SUMS, WIDER_AT_RIMS = 1.5, 2.5, 2.0, 5.0
 # A largest value that the raised solution does not confirm is a peak at a place of bad shape as a rule: 134 at a corner
 # of a hexahedron, in the raised solution 66 at another place. Then the raised solution's value is the answer.
 CONFIRMED = 0.2  # largest difference, as a share of the larger value
