@@ -80,3 +80,18 @@ def test_no_interval_is_explained():
     assert answer.lower is None and answer.why == "not estimated: the iteration did not converge"
     (answer,) = asked(benchmark_volume(1, 2), Poisson(source="1"), "u at (0.5, 0.5, 0.5)", degree=8)
     assert answer.why == "not estimated: degree 8 is the highest one"
+
+
+@pytest.mark.parametrize(
+    ("text", "why"),
+    [
+        ("von_mises max over u0", "no sample of the boundary lies there"),
+        ("von_mises at (0, 0, 0)", "near a place where it is infinite"),
+        ("max von_mises over x < 1", "near a place where it is infinite"),
+    ],
+)
+def test_near_an_infinite_stress_there_is_no_interval(text, why):
+    bar = iga_nn.BSplineVolume.from_function(lambda u, v, w: (10 * u, v, w), 4)
+    law = iga_nn.Elasticity(fix="u0", load={"u1": (1, 0, 0)}, poisson_ratio=0.3)
+    (answer,) = iga_nn.solve(bar, law, ask=text, estimate=False).answers
+    assert answer.lower is None and why in answer.why

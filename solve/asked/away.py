@@ -20,6 +20,7 @@ SHARES = (1.0, 0.5, 0.25)  # of SPANS: smaller radii where a part lies within th
 MOST_PLACES = 2  # that are named
 
 Asked = TypeVar("Asked", bound=Functional)
+Near = TypeVar("Near", AtPlace, Extreme)
 
 
 def away(asked: Functional, solution: Solution) -> Functional:
@@ -32,7 +33,7 @@ def away(asked: Functional, solution: Solution) -> Functional:
     if isinstance(asked, AtPlace):
         point = solution.body.points(np.array([asked.patch]), asked.parameters[None])
         near = places.is_near(point)[0]
-        return _saying(asked, f"within {SPANS:g} spans of {_named(places)}, where it is infinite") if near else asked
+        return _unknown(asked, f"within {SPANS:g} spans of {_named(places)}, where it is infinite") if near else asked
     return _outside(asked, solution, places)
 
 
@@ -50,7 +51,12 @@ def _outside(asked: Extreme, solution: Solution, places: SingularPlaces) -> Func
             unit = "span" if spans == 1.0 else "spans"
             said = f"farther than {spans:g} {unit} (at most {radius:.3g}) from {_named(places)}, where it is infinite"
             return replace(_saying(asked, said), is_excluded=is_near)
-    return _saying(asked, f"a number without meaning: all of the mesh there lies near to {_named(places)}")
+    return _unknown(asked, f"a number without meaning: all of the mesh there lies near to {_named(places)}")
+
+
+def _unknown(asked: Near, said: str) -> Near:
+    """Return a functional that has no interval: near a singular place no error can be seen."""
+    return replace(_saying(asked, said), unknown="near a place where it is infinite, what a mesh adds says nothing")
 
 
 def _named(places: SingularPlaces) -> str:

@@ -79,10 +79,11 @@ class Functional(ABC):
 
 @dataclass(frozen=True, eq=False)
 class AtPlace(Functional):
-    """A quantity at a place of a patch."""
+    """A quantity at a place of a patch. unknown: why it has no interval; "" where it may have one."""
 
     patch: int
     parameters: Array  # (3,)
+    unknown: str = ""
 
     def _piece(self, solution: FieldOnBody) -> Piece:
         for group in self.part.groups(solution):
@@ -125,9 +126,13 @@ class Integral(Functional):
 
 @dataclass(frozen=True, eq=False)
 class Extreme(Functional):
-    """The largest or the smallest value of a quantity in a part, without excluded points, where it is infinite."""
+    """The largest or the smallest value of a quantity in a part, without excluded points, where it is infinite.
+
+    unknown: why it has no interval; "" where it may have one.
+    """
 
     is_excluded: Excluded | None = None
+    unknown: str = ""
 
     def _search(self, solution: FieldOnBody) -> tuple[float, Place, int, Array]:
         """Return the value, its point, patch and parameters."""

@@ -72,7 +72,11 @@ def answer(asked: Functional, solution: Solution, raised: Raised) -> Answer:
     found = asked.answer(solution)
     if math.isnan(found.value):
         return found
+    if isinstance(asked, AtPlace | Extreme) and asked.unknown:
+        return replace(found, why=f"{NOT_ESTIMATED}: {asked.unknown}")
     higher = asked.answer(raised.solution)
+    if math.isnan(higher.value):
+        return replace(found, why=f"{NOT_ESTIMATED}: {higher.why}")
     added = abs(higher.value - found.value)
     if isinstance(asked, Extreme) and added > CONFIRMED * max(abs(found.value), abs(higher.value)):
         parts = {"discretization": UNCONFIRMED * added, "iteration": ITERATION * added}

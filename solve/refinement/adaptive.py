@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from numbers import Real
 from typing import Any
 
 from parameterize.display import Shown
@@ -134,7 +135,7 @@ def refinement_of(
     body: BodyLike, problem: BoundaryValueProblem, options: SolveOptions, accuracy: float, limits: Limits
 ) -> Refinement:
     """Return the refinement of `adaptive`, to be iterated over. Raises ValueError as `adaptive`."""
-    if not 0.0 < accuracy < 1.0:
+    if not (isinstance(accuracy, Real) and 0.0 < accuracy < 1.0):
         raise ValueError(f"accuracy must be a number between 0 and 1, such as 0.02 for 2 %, got {accuracy!r:.80}")
     if options.comm is not None:
         raise ValueError("an accuracy is refined for in one process: leave comm out")
