@@ -26,8 +26,8 @@ from .scatter import scatter
 # (examples/benchmarks/textbook.py). A held region that ends inside of a face has a rim where nothing is divided: a
 # fifth of the error was seen on a wedge (examples/benchmarks/part_intervals.py).
 WIDER, WIDER_AT_ENDS, WIDER_OF_SUMS, WIDER_AT_RIMS = 1.5, 2.5, 2.0, 5.0
-# A largest value that the raised solution does not confirm is a peak at a place of bad shape as a rule: 134 at a corner
-# of a hexahedron, in the raised solution 66 at another place. Then the raised solution's value is the answer.
+# A largest value that the raised solution does not confirm is a peak at a place of bad shape as a rule. Then the raised
+# solution's value is the answer.
 CONFIRMED = 0.2  # largest difference, as a share of the larger value
 UNCONFIRMED = 0.5  # half of the interval over the difference
 BY_CHANCE = 0.4  # share of the error around a place that counts where the error happens to vanish at the place

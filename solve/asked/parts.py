@@ -153,9 +153,12 @@ class Part:
         """Return the faces of points inside: none."""
         return FacesOfPoints(("",), np.array(0), tolerance(all_control_points(self.body).T))
 
-    def pieces(self, solution: FieldOnBody) -> Iterator[Piece]:
-        """Yield the quadrature points of the part. Raises ValueError where it is empty."""
-        groups = self.groups(solution)
+    def pieces(self, solution: FieldOnBody, groups: Sequence[FieldGroup] = ()) -> Iterator[Piece]:
+        """Yield the quadrature points of the part. Raises ValueError where it is empty.
+
+        groups: of the patches of the solution; by default those with each patch's own gradients.
+        """
+        groups = groups or self.groups(solution)
         spans = sum(len(group) * math.prod(len(breakpoints(row)) - 1 for row in group.values.knots) for group in groups)
         if self.on_boundary:
             yield from self._on_boundary(solution, groups, spans)

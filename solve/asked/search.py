@@ -57,9 +57,13 @@ def extreme_inside(
 def extreme_on_boundary(
     part: Part, solution: FieldOnBody, quantity_of: QuantityOf, is_max: bool, is_excluded: Excluded | None
 ) -> Found:
-    """Return the largest or the smallest value on a part of the boundary: at quadrature points, refined on faces."""
+    """Return the largest or the smallest value on a part of the boundary: at quadrature points, refined on faces.
+
+    Gradients are averaged where patches meet. Raises ValueError where no sample lies there.
+    """
+    groups = averaged_groups(solution, part.body, part.problems)
     sign, best = 1.0 if is_max else -1.0, list[tuple[float, Piece, Array, int]]()
-    for piece in part.pieces(solution):
+    for piece in part.pieces(solution, groups):
         values = sign * np.ravel(piece.values(quantity_of))
         if is_excluded is not None:
             values = np.where(is_excluded(piece.points), -np.inf, values)
