@@ -78,13 +78,6 @@ def test_a_solution_is_the_start_on_a_finer_grading():
     assert again.report.residuals[0] < 0.5
 
 
-def test_smooth_limits_the_ratio_of_neighbouring_spans():
-    found = Grading.of(box((0, 0, 0), 4)).refined({1: [0, 3, 0, 0]}).smooth(2.0)
-    steps = np.diff(found.rows[1])
-    assert np.maximum(steps[1:] / steps[:-1], steps[:-1] / steps[1:]).max() <= 2.0
-    assert np.isin(np.arange(1, 2.001, 0.125), found.rows[1]).all()
-
-
 def test_json_gives_the_same_grading_and_refuses_that_of_another_body():
     body = plate()
     grading = towards(body, 2, 4)

@@ -3,7 +3,7 @@ import pytest
 
 import iga_nn
 from solve.discretization.grading import MOST_HALVINGS, Grading
-from solve.refinement.marking import BOTH, LEFT, Spans, marked, smooth_part, unknowns_of
+from solve.refinement.marking import BOTH, LEFT, SheetSpans, marked, smooth_part, unknowns_of
 
 
 def graded(spans=(2, 2, 2)):
@@ -11,7 +11,7 @@ def graded(spans=(2, 2, 2)):
 
 
 def of(grading, values, degree=2, before=None):
-    return Spans.of(grading, np.concatenate([np.array(row, dtype=float) for row in values]), degree, before)
+    return SheetSpans.of(grading, np.concatenate([np.array(row, dtype=float) for row in values]), degree, before)
 
 
 def counts_of(grading, degree=2):

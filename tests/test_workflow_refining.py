@@ -11,7 +11,7 @@ from plane_bodies import arrays
 from iga_nn import InputError, PoissonOptions
 from iga_nn.cli.commands import main
 from iga_nn.workflow.pipeline import solve_to
-from solve.refinement.loop import Refinement
+from solve.refinement.loop import AdaptiveSolve
 
 ASK = "u at (0.5, 0.5, 0.5)"
 
@@ -63,7 +63,7 @@ def test_an_interrupted_run_goes_on_with_its_last_step(in_folder, few_distances,
     Path("L.obj").write_text(obj(*arrays("L")))
     run = ["run", "poisson", "L.obj", "--source", "1", "--control-points", "6", "--degree", "2", "--accuracy", "3%"]
     assert main([*run, "--out", "whole"]) == 0
-    whole, step, done = section_of("whole"), Refinement._step, []
+    whole, step, done = section_of("whole"), AdaptiveSolve._step, []
     assert len(whole["levels"]) > 2
 
     def ends(self, options):
@@ -72,9 +72,9 @@ def test_an_interrupted_run_goes_on_with_its_last_step(in_folder, few_distances,
             raise KeyboardInterrupt
         return step(self, options)
 
-    monkeypatch.setattr(Refinement, "_step", ends)
+    monkeypatch.setattr(AdaptiveSolve, "_step", ends)
     assert main([*run, "--out", "out"]) == 130
-    monkeypatch.setattr(Refinement, "_step", step)
+    monkeypatch.setattr(AdaptiveSolve, "_step", step)
     assert len(section_of("out")["levels"]) == 2
     assert main([*run, "--out", "out", "--resume"]) == 0
     resumed = section_of("out")

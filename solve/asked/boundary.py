@@ -56,7 +56,7 @@ class Given:
 
 
 @dataclass(frozen=True, eq=False)
-class Piece:
+class BoundaryPiece:
     """Hold m Gauss points of outer faces of one name, of patches with equal knots, law and data.
 
     group: the patches, with the solution. rows: (m,), the patch of each point in it.
@@ -85,7 +85,7 @@ class Piece:
         return np.asarray(quantity(self.u.u, self.u.grad, x), dtype=np.float64)
 
 
-def pieces_of(solution: Solution, adjoints: Sequence[BodyField]) -> Iterator[Piece]:
+def pieces_of(solution: Solution, adjoints: Sequence[BodyField]) -> Iterator[BoundaryPiece]:
     """Yield the points of the whole boundary, with degree + 2 Gauss points a span and direction."""
     body, problems = solution.body, [patch.problem for patch in solution.patches]
     for group, *of_z in zip(*(groups_of(field, body, problems) for field in (solution, *adjoints)), strict=True):
@@ -137,7 +137,7 @@ def _piece(
     of_z: Sequence[FieldGroup],
     grid: _FaceGrid,
     chosen: IntArray,
-) -> Piece:
+) -> BoundaryPiece:
     """Return the points on the faces of the chosen patches of a group."""
     owners, where = np.repeat(chosen, len(grid.weights)), np.tile(grid.parameters, (len(chosen), 1))
     axis, side = FACES[grid.face]
@@ -149,12 +149,12 @@ def _piece(
     problem = problems[own[0]]
     names = [problems[number].prefix + FACE_NAMES[grid.face] for number in own]
     nets = [np.take(body.patches[number].control_points, -side, axis=axis).reshape(-1, 3) for number in own]
-    data = _Data(problem, FACE_NAMES[grid.face], x, normal, weights, STEP * body.size)
+    data = _GivenData(problem, FACE_NAMES[grid.face], x, normal, weights, STEP * body.size)
     given = data.given(np.stack(nets), names, each)
     across = jacobian[:, :, axis].T
     flat = np.abs((across * normal).sum(axis=0)) < FLAT * np.linalg.norm(across, axis=0)
     at = _Traces(problem, grid.face, owners, where, normal, given, flat)
-    return Piece(
+    return BoundaryPiece(
         group=group,
         rows=owners,
         places=where,
@@ -262,7 +262,7 @@ def curvature(group: FieldGroup, owners: IntArray, where: Array, axis: int, jaco
 
 
 @dataclass(frozen=True, eq=False)
-class _Data:
+class _GivenData:
     """Evaluate the data of a face at its points, and beside them. step: a length."""
 
     problem: BoundaryValueProblem

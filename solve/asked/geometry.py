@@ -21,9 +21,9 @@ from parameterize.arrays import Array
 
 from ..field import BodyField
 from ..solution import Solution
-from .boundary import Piece, Values, pieces_of
+from .boundary import BoundaryPiece, Values, pieces_of
 
-Density = Callable[[Piece, Values], Array]
+Density = Callable[[BoundaryPiece, Values], Array]
 
 
 @runtime_checkable
@@ -77,7 +77,7 @@ def geometry_parts(
     return [GeometryPart(change, spread, distance) for change, spread in rows]
 
 
-def density(piece: Piece, z: Values) -> Array:
+def density(piece: BoundaryPiece, z: Values) -> Array:
     """Return the derivative (m,) of an adjoint's quantity by a shift of the boundary along the normal, per area."""
     u, given, normal = piece.u, piece.given, piece.normal
     free = np.eye(len(u.u))[:, :, None] - given.projector
@@ -89,7 +89,7 @@ def density(piece: Piece, z: Values) -> Array:
     return found + _of_fluxes(piece, z, slope_u, slope_z)
 
 
-def _of_fluxes(piece: Piece, z: Values, slope_u: Array, slope_z: Array) -> Array:
+def _of_fluxes(piece: BoundaryPiece, z: Values, slope_u: Array, slope_z: Array) -> Array:
     """Return the part (m,) of given fluxes and exchanges."""
     given, is_pressed = piece.given, piece.given.pressure.any()
     flux = given.loads - given.factor * piece.u.u

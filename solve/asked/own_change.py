@@ -15,8 +15,7 @@ from ..field_groups import FieldGroup
 from ..forms.form import reaction
 from ..quantities import at_places
 from ..solution import Solution
-from .boundary import Piece as OnBoundary
-from .boundary import Values, curvature
+from .boundary import BoundaryPiece, Values, curvature
 from .functional import Flow, Functional, Integral, Reaction
 from .geometry import TrueSurface
 from .linearised import slopes_of
@@ -46,7 +45,7 @@ class OwnChange:
         size = sum(float(piece.weights.sum()) for piece in functional.part.pieces(solution))
         return cls(functional, solution, value, None, size)
 
-    def density(self, piece: OnBoundary, z: Values) -> Array:
+    def density(self, piece: BoundaryPiece, z: Values) -> Array:
         """Return the change (m,) of J by a shift of the boundary along its normal, per area."""
         if isinstance(self.functional, Reaction):  # of the flux through a held face, for z = -1 there
             return np.einsum("cm,cdm,dm->m", piece.source - piece.u.reaction, piece.given.projector, z.u)
@@ -61,7 +60,7 @@ class OwnChange:
         of_grad = share * piece.of_solution(slopes_of(quantity))[-3 * c :].reshape(c, 3, -1)
         return share * inside - self._through_held(piece, of_grad)
 
-    def _through_held(self, piece: OnBoundary, of_grad: Array) -> Array:
+    def _through_held(self, piece: BoundaryPiece, of_grad: Array) -> Array:
         """Return the part (m,) of the adjoint's flux through held faces that J itself makes up, of_grad (c, 3, m)."""
         pull = np.einsum("cam,am->cm", of_grad, piece.normal)
         slope = np.einsum("cdm,dam,am->cm", piece.given.projector, piece.u.grad, piece.normal)

@@ -19,7 +19,7 @@ NONE = 0.001  # and as nothing
 
 
 @dataclass(frozen=True)
-class Supports:
+class SupportsOfRegion:
     """Hold supports by their names in a balance. faces: such as "u0", whose reactions have the names of faces."""
 
     roles: tuple[str, ...]
@@ -34,7 +34,7 @@ class _Support:
     is_face: bool
 
 
-def supports_in(ask: Ask, problem: BoundaryValueProblem, body: Body) -> Supports | None:
+def supports_in(ask: Ask, problem: BoundaryValueProblem, body: Body) -> SupportsOfRegion | None:
     """Return the supports in an ask's region; None for a flow through a region that is not made of supports.
 
     problem: placed in the body. Raises ValueError for a reaction of a region without a support, or with a part of one.
@@ -53,7 +53,7 @@ def supports_in(ask: Ask, problem: BoundaryValueProblem, body: Body) -> Supports
         known = ", ".join(repr(str(one.region)) for one in every) or "there are none"
         raise ValueError(f"no support lies in {str(ask.region)!r}; the supports are on {known}")
     roles, faces = (tuple(one.name for one in own if one.is_face == on) for on in (False, True))
-    return Supports(roles, faces, f"of {', '.join(one.name for one in own)}")
+    return SupportsOfRegion(roles, faces, f"of {', '.join(one.name for one in own)}")
 
 
 def _all_supports(problem: BoundaryValueProblem) -> Iterator[_Support]:

@@ -87,16 +87,6 @@ class Grading:
         """Return a grading with every span halved so many times."""
         return self.refined({sheet: np.full(count, times) for sheet, count in enumerate(self.spans)})
 
-    def smooth(self, ratio: float) -> "Grading":
-        """Return a grading whose neighbouring spans of a sheet differ by a factor of at most `ratio`, 2 or more.
-
-        Spans are halved until they do. Spans are compared in spans of the map.
-        """
-        found = self
-        while any(_too_long(row, ratio).any() for row in found.rows):
-            found = found.refined({sheet: _too_long(row, ratio) for sheet, row in enumerate(found.rows)})
-        return found
-
     def contains(self, other: "Grading") -> bool:
         """Return whether every breakpoint of another grading of the body is one of this grading."""
         return all(np.isin(theirs, own).all() for own, theirs in zip(self.rows, other.rows, strict=True))
@@ -162,10 +152,3 @@ def _divided(row: Array, times: IntArray) -> Array:
     """Return places (n,) with each span in 2^times equal parts, which are exact."""
     parts = [a + (b - a) * np.arange(2**k) / 2**k for a, b, k in zip(row, row[1:], times, strict=False)]
     return np.concatenate([*parts, row[-1:]])
-
-
-def _too_long(row: Array, ratio: float) -> Array:
-    """Return which spans (n - 1,) of places are longer than `ratio` times a neighbour."""
-    steps = np.diff(row)
-    around = np.minimum(np.append(np.inf, steps[:-1]), np.append(steps[1:], np.inf))
-    return np.asarray(steps > ratio * around * (1.0 + 1e-12))

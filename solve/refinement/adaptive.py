@@ -16,7 +16,7 @@ from ..discretization.grading import Grading
 from ..forms.boundary_value_problem import BoundaryValueProblem
 from ..options import SolveOptions, check_device
 from ..solution import Solution
-from .loop import Limits, Refinement, Step
+from .loop import AdaptiveSolve, Limits, Step
 
 ACCURACY = 0.02
 TOLERANCE = 1e-8  # of the linear solver, by default: asked quantities then have seven digits
@@ -133,7 +133,7 @@ def adaptive(
 
 def refinement_of(
     body: BodyLike, problem: BoundaryValueProblem, options: SolveOptions, accuracy: float, limits: Limits
-) -> Refinement:
+) -> AdaptiveSolve:
     """Return the refinement of `adaptive`, to be iterated over. Raises ValueError as `adaptive`."""
     if not (isinstance(accuracy, Real) and 0.0 < accuracy < 1.0):
         raise ValueError(f"accuracy must be a number between 0 and 1, such as 0.02 for 2 %, got {accuracy!r:.80}")
@@ -145,4 +145,4 @@ def refinement_of(
     grading = (options.grading or Grading.of(glued)).uniform(options.refine)
     if len(glued) <= FEW:
         grading = grading.refined({sheet: [count == 1] * count for sheet, count in enumerate(grading.spans)})
-    return Refinement(glued, problem, replace(options, refine=0), grading, accuracy, functionals, limits)
+    return AdaptiveSolve(glued, problem, replace(options, refine=0), grading, accuracy, functionals, limits)

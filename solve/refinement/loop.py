@@ -32,7 +32,7 @@ from ..preparation import discretized
 from ..solution import Solution
 from ..system import System
 from .indicators import Elements, along_directions, directional_energies, energies
-from .marking import Spans, marked
+from .marking import SheetSpans, marked
 
 GROWTH = 2.0  # of the unknowns, a step: all solves together then cost about twice the last one
 LEAST_GROWTH = 1.2  # that is worth a step
@@ -96,7 +96,7 @@ class Step:
 
 
 @dataclass
-class Refinement:
+class AdaptiveSolve:
     """Refine a problem on a body step after step; `stopped` then says what ended it, "" for its accuracy.
 
     grading: of the first step. functionals: the quantities whose accuracy counts, none for the energy. start: where the
@@ -114,7 +114,7 @@ class Refinement:
     start: Solution | None = None
     is_solved: bool = False
     stopped: str = field(init=False, default="")
-    _spans: Spans | None = field(init=False, default=None)
+    _spans: SheetSpans | None = field(init=False, default=None)
     _asked: Sequence[Functional] = field(init=False, default=())
     _count: int = field(init=False, default=0)  # of steps
 
@@ -193,7 +193,7 @@ class Refinement:
             plain += own
             weighed += own * (min(excesses[number], MOST_EXCESS) ** power / max(float(own.sum()), TINY))
         degree = max(max(patch.space.degrees) for patch in system.stated)
-        self._spans = Spans.of(self.grading, plain, degree, self._spans)
+        self._spans = SheetSpans.of(self.grading, plain, degree, self._spans)
         counts = np.array([patch.space.shape for patch in system.stated])
         most = self.limits.unknowns / (self.problem.form.components * system.unknowns.count)
         spans = replace(self._spans, value=weighed)

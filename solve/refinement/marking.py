@@ -22,7 +22,7 @@ LEFT, RIGHT, BOTH = 0, 1, 2
 
 
 @dataclass(frozen=True, eq=False)
-class Spans:
+class SheetSpans:
     """Hold the spans of all sheets, with what each one misses and what halving leaves of it.
 
     sheet: (n,). low, high: (n,), the ends of the spans. value: (n,), what each misses. kept: (n,), the part of it that
@@ -37,7 +37,7 @@ class Spans:
     side: IntArray
 
     @classmethod
-    def of(cls, grading: Grading, values: Array, degree: int, before: Spans | None = None) -> Spans:
+    def of(cls, grading: Grading, values: Array, degree: int, before: SheetSpans | None = None) -> SheetSpans:
         """Return the spans of a grading with their numbers (n,), those of one sheet after another.
 
         before: those of the step before: what its halves have kept is expected of the next ones.
@@ -48,7 +48,7 @@ class Spans:
         plain = cls(sheet, low, high, values, np.full(count, smooth_part(degree)), np.full(count, BOTH))
         return plain if before is None else plain._after(before, degree)
 
-    def _after(self, before: Spans, degree: int) -> Spans:
+    def _after(self, before: SheetSpans, degree: int) -> SheetSpans:
         """Return the same spans with what is learnt from the step before."""
         kept, side = self.kept.copy(), self.side.copy()
         parent = before._holding(self.sheet, self.low)
@@ -79,7 +79,7 @@ class Spans:
         left = np.where(self.side == BOTH, 2.0 * self.kept, self.kept)
         return self.value * np.maximum(1.0 - left, LEAST_GAIN)
 
-    def halved(self, chosen: Mask, degree: int) -> Spans:
+    def halved(self, chosen: Mask, degree: int) -> SheetSpans:
         """Return the spans with some of them halved, and what is expected of the halves."""
         one = self._chosen(chosen)
         middle = 0.5 * (one.low + one.high)
@@ -100,11 +100,11 @@ class Spans:
             )
         return self._chosen(~chosen)._with(*halves)
 
-    def _chosen(self, chosen: Mask) -> Spans:
-        return Spans(*(getattr(self, name)[chosen] for name in _NAMES))
+    def _chosen(self, chosen: Mask) -> SheetSpans:
+        return SheetSpans(*(getattr(self, name)[chosen] for name in _NAMES))
 
-    def _with(self, *others: Spans) -> Spans:
-        return Spans(*(np.concatenate([getattr(own, name) for own in (self, *others)]) for name in _NAMES))
+    def _with(self, *others: SheetSpans) -> SheetSpans:
+        return SheetSpans(*(np.concatenate([getattr(own, name) for own in (self, *others)]) for name in _NAMES))
 
 
 _NAMES = ("sheet", "low", "high", "value", "kept", "side")
@@ -115,7 +115,7 @@ def smooth_part(degree: int) -> float:
     return 0.5 ** (2 * degree + 1)
 
 
-def marked(grading: Grading, spans: Spans, counts: IntArray, degree: int, growth: float, target: float) -> Grading:
+def marked(grading: Grading, spans: SheetSpans, counts: IntArray, degree: int, growth: float, target: float) -> Grading:
     """Return the grading with spans halved until the unknowns have grown by a factor, or the target is expected.
 
     counts: (patches, 3), the functions of each patch along its directions. target: of the sum of all numbers.
@@ -141,7 +141,7 @@ def _best(score: Array, added: Array, left: float) -> Mask:
     return np.asarray(score >= max(TOGETHER * score.max(), least))
 
 
-def _with_spans(grading: Grading, spans: Spans) -> Grading:
+def _with_spans(grading: Grading, spans: SheetSpans) -> Grading:
     """Return a grading with the given spans; of a sheet that is tied to itself in reverse, with those of both ways."""
     rows = []
     for sheet, row in enumerate(grading.rows):

@@ -10,10 +10,10 @@ from parameterize.spline.body import Body
 from ..forms.boundary_value_problem import BoundaryValueProblem
 from .held import Supports
 from .judged_edges import DIFFER, JudgedEdges
-from .pieces import Pieces, of_rim
+from .pieces import SingularPieces, of_rim
 from .places import SingularPlace, SingularPlaces
-from .rims import Rim, rims_in_faces
-from .spans import Spans
+from .rims import HeldRim, rims_in_faces
+from .spans import SpanLengths
 
 
 def singular_places(body: Body, problems: Sequence[BoundaryValueProblem], knots: Sequence[Knots]) -> SingularPlaces:
@@ -23,14 +23,14 @@ def singular_places(body: Body, problems: Sequence[BoundaryValueProblem], knots:
     far a place reaches. Exponents are those of isotropic laws with a symmetric part alone. Edges inside the body at
     which three solids meet, edges inside a patch with knots as many as its degree, and corners are not looked at.
     """
-    supports, spans = Supports(body, problems), Spans.of(knots)
-    found = list(Pieces(JudgedEdges(body, problems, supports, spans)).places())
+    supports, spans = Supports(body, problems), SpanLengths.of(knots)
+    found = list(SingularPieces(JudgedEdges(body, problems, supports, spans)).places())
     if supports.conditions and not supports.is_of_faces:
         found = _with_rims(found, rims_in_faces(body, supports, spans.inner, DIFFER), supports)
     return SingularPlaces(tuple(found))
 
 
-def _with_rims(found: list[SingularPlace], rims: Rim, supports: Supports) -> list[SingularPlace]:
+def _with_rims(found: list[SingularPlace], rims: HeldRim, supports: Supports) -> list[SingularPlace]:
     """Return the places together with the rims inside faces: those of one condition are one place."""
     for name in np.unique(rims.names).tolist():
         own, text = rims.names == name, of_rim(supports, name)

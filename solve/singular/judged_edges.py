@@ -16,7 +16,7 @@ from ..forms.boundary_value_problem import BoundaryValueProblem
 from ..forms.elasticity import Elasticity
 from .edges import ACROSS, INSET, PatchEdges, across, edges_of, outward
 from .held import Supports
-from .spans import Spans
+from .spans import SpanLengths
 from .wedge import REGULAR, Sector, exponent
 
 SMOOTH = 10.0  # degrees by which faces of a smooth surface may bend where two patches meet; of 40 CAD parts all are
@@ -33,7 +33,7 @@ class JudgedEdges:
     body: Body
     problems: Sequence[BoundaryValueProblem]
     supports: Supports
-    spans: Spans
+    spans: SpanLengths
 
     @cached_property
     def of_patches(self) -> PatchEdges:

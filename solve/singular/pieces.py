@@ -18,7 +18,7 @@ _MOST = 200_000  # points of all edges
 
 
 @dataclass(frozen=True, eq=False)
-class Pieces:
+class SingularPieces:
     """Hold judged edges, whose samples each stand for a piece: of edge e (m,) the one around sample s (m,)."""
 
     edges: JudgedEdges

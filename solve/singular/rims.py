@@ -20,7 +20,7 @@ _BISECTIONS = 12
 
 
 @dataclass(frozen=True, eq=False)
-class Rim:
+class HeldRim:
     """Hold points (m, 3) of rims, sides (m, 3, 3) of the spans there, and the number (m,) of the condition."""
 
     points: Array
@@ -28,7 +28,7 @@ class Rim:
     names: IntArray
 
 
-def rims_in_faces(body: Body, supports: Supports, breaks: Sequence[Sequence[Array]], differ: float) -> Rim:
+def rims_in_faces(body: Body, supports: Supports, breaks: Sequence[Sequence[Array]], differ: float) -> HeldRim:
     """Return the rims of conditions inside faces; those along edges are left out.
 
     breaks: the breakpoints of each direction of each patch. differ: the norm of the difference of two projectors from
@@ -38,13 +38,13 @@ def rims_in_faces(body: Body, supports: Supports, breaks: Sequence[Sequence[Arra
     if len(faces) > _MANY:
         faces = faces[[len(np.unique(codes)) > 1 for codes in _sampled(body, supports, faces, _FIRST, _FIRST)]]
     counts = np.array([_counts(breaks, face) for face in faces.tolist()], dtype=np.int64).reshape(-1, 2)
-    parts = [Rim(np.zeros((0, 3)), np.zeros((0, 3, 3)), np.zeros(0, dtype=np.int64))]
+    parts = [HeldRim(np.zeros((0, 3)), np.zeros((0, 3, 3)), np.zeros(0, dtype=np.int64))]
     for count in np.unique(counts, axis=0):
         own = faces[(counts == count).all(axis=1)]
         codes = _sampled(body, supports, own, int(count[0]), int(count[1]))
         for direction in (0, 1):
             parts.append(_crossings(body, supports, breaks, own, codes, direction, differ))
-    return Rim(*(np.concatenate([getattr(part, name) for part in parts]) for name in ("points", "spans", "names")))
+    return HeldRim(*(np.concatenate([getattr(part, name) for part in parts]) for name in ("points", "spans", "names")))
 
 
 def _counts(breaks: Sequence[Sequence[Array]], face: int) -> list[int]:
@@ -87,7 +87,7 @@ def _crossings(
     codes: IntArray,
     direction: int,
     differ: float,
-) -> Rim:
+) -> HeldRim:
     """Return the points between neighbouring samples along a direction, 0 or 1, whose codes (k, a, b) differ."""
     rows = [_samples(count) for count in codes.shape[1:]]
     k, i, j = np.nonzero(np.diff(codes, axis=1 + direction))
@@ -104,7 +104,7 @@ def _crossings(
     changed = (before[0] ^ after[0])[is_rim]
     lowest = np.round(np.log2(np.maximum(changed & -changed, 1))).astype(np.int64)
     sides = _sides(body, breaks, own[is_rim], low[is_rim])
-    return Rim(0.5 * (before[1] + after[1])[is_rim], sides, lowest)
+    return HeldRim(0.5 * (before[1] + after[1])[is_rim], sides, lowest)
 
 
 def _sides(body: Body, breaks: Sequence[Sequence[Array]], faces: IntArray, along: Array) -> Array:

@@ -10,14 +10,14 @@ from parameterize.spline.bspline import breakpoints
 
 
 @dataclass(frozen=True, eq=False)
-class Spans:
+class SpanLengths:
     """Hold the breakpoints of each direction of each patch, and the first and last span, (patches, 3, 2)."""
 
     inner: Sequence[Sequence[Array]]
     outer: Array
 
     @classmethod
-    def of(cls, knots: Sequence[Knots]) -> "Spans":
+    def of(cls, knots: Sequence[Knots]) -> "SpanLengths":
         """Return the spans of the knots of each patch."""
         known: dict[bytes, Array] = {}
         inner = []
