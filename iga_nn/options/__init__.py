@@ -2,15 +2,15 @@
 
 from .analysis import ModesOptions as ModesOptions
 from .analysis import StudyOptions as StudyOptions
+from .elasticity import ElasticityOptions as ElasticityOptions
 from .mapping import MapOptions as MapOptions
 from .mapping import SurfaceOptions as SurfaceOptions
+from .poisson import PoissonOptions as PoissonOptions
 from .problem import NO_UNITS as NO_UNITS
-from .problem import PROBLEMS as PROBLEMS
 from .problem import UNITS as UNITS
-from .problem import ElasticityOptions as ElasticityOptions
-from .problem import PoissonOptions as PoissonOptions
 from .problem import ProblemOptions as ProblemOptions
 from .problem import Units as Units
+from .problems import PROBLEMS as PROBLEMS
 from .space_check import check_size as check_size
 from .space_check import check_space as check_space
 from .workers import WorkerOptions as WorkerOptions

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..errors import InputError, input_errors
 from ..type_check import Checked
-from .problem import modulus
+from .elasticity import modulus
 from .space_check import check_level, check_space
 
 if TYPE_CHECKING:

@@ -1,0 +1,153 @@
+"""Holds the options of linear elasticity."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
+
+from ..errors import InputError, input_errors
+from . import texts
+from .problem import Formula, ProblemOptions, Row, Sheet, Units, by_patch
+from .space_check import check_space
+
+if TYPE_CHECKING:
+    from solve import Elasticity, SolveOptions
+
+MOST_ITERATIONS = 3000  # of an elastic body; a bracket held at one end takes 680, and some 1600 after a refinement
+
+
+@dataclass(frozen=True)
+class ElasticityOptions(ProblemOptions):
+    """State linear elasticity of the volume as an isotropic body, and the meshes it is solved on.
+
+    A face is one of u0, u1, v0, v1, w0, w1: the image of u = 0, u = 1 and so on. A vector is three formulas in x, y, z
+    or X, Y, Z (scaled to volume 1 about the middle), separated by semicolons, in quotes: "x*y;0;sin(z)"; 0 is the zero
+    vector.
+
+    Attributes:
+        exact: exact displacement, a vector, from which force and boundary data follow; errors are reported. A vector
+            that starts with a minus is written --exact="-x;0;0".
+        body_force: force per volume, a vector; zero where neither it nor exact is given; also one for each solid.
+        displacement: displacement on the faces without traction, a vector; zero where neither it nor exact is given.
+        traction: faces where a traction is given, each as "FACE=VECTOR", FACE=0 for a face that is free, or FACE for
+            the traction of the exact solution.
+        young: Young's modulus E; of several solids also one for each by its name, "steel: 210000, pad: 8", and of
+            several patches "p0: 210, p1: 70". The second solid is solid2 if it has no name; a name with a comma or a
+            colon stands in quotes.
+        poisson_ratio: Poisson's ratio nu, as young.
+        formulation: "mixed" solves for displacement and pressure, as bodies that hardly change their volume need,
+            "displacement" for the displacement alone; by default mixed where Poisson's ratio exceeds 0.45.
+        fix: regions of the boundary that are held, each as REGION, or "REGION=VECTOR" for a given displacement; an
+            entry of the vector that is left out is free: "x < 1=0;;". A region is a condition on position and outward
+            normal, "nz > 0.9 and x < 2", a face of the part, "face(x, y, z)", a group of the mesh, group:NAME, a
+            box(x0, y0, z0, x1, y1, z1) or a face of the cube. Where regions are given, all else of the boundary is
+            free.
+        roller: regions held along their normal only.
+        symmetry: regions where a plane of symmetry cuts the body; held along their normal as by a roller.
+        load: regions with a force per area, each as "REGION=VECTOR".
+        pressure: regions with a force per area against the outward normal, each as "REGION=FORMULA".
+        spring: regions on an elastic foundation, force per area and displacement, each as "REGION=FORMULA".
+        stress_unit: unit of stresses, such as MPa; free text that is shown behind stresses and changes no number.
+
+    Examples:
+        >>> import iga_nn
+        >>> iga_nn.ElasticityOptions(body_force="0;0;-1", young=210.0).problem().body_force
+        ['0', '0', '-1']
+    """
+
+    body_force: Formula | None = None
+    displacement: Formula | None = None
+    traction: tuple[str, ...] = ()
+    young: float | str = 1.0
+    poisson_ratio: float | str = 0.3
+    formulation: Literal["mixed", "displacement"] | None = None
+    fix: tuple[str, ...] = ()
+    roller: tuple[str, ...] = ()
+    symmetry: tuple[str, ...] = ()
+    load: tuple[str, ...] = ()
+    pressure: tuple[str, ...] = ()
+    spring: tuple[str, ...] = ()
+    stress_unit: str | None = None
+
+    section: ClassVar[str] = "elasticity"
+    title: ClassVar[str] = "linear elasticity"
+    essential: ClassVar[Row] = ("displacement u", "displacement")
+    natural: ClassVar[Row] = ("traction σ n", "traction")
+    on_faces: ClassVar[tuple[str, ...]] = ("traction",)
+    sheet: ClassVar[Sheet] = Sheet(
+        "an elastic body",
+        "−div σ = f, small displacements. Click a face of the part for its region; the rest of its boundary is free.",
+        (
+            ("young", "Young's modulus E", "1"),
+            ("poisson_ratio", "Poisson's ratio ν", "0.3"),
+            ("body_force", "Force per volume, three formulas", "0;0;0"),
+            ("stress_unit", "Unit of stresses, such as MPa", "none"),
+        ),
+        {"young": "E", "poisson_ratio": "ν", "body_force": "f"},
+    )
+
+    @classmethod
+    def law_of(cls, section: Mapping[str, Any]) -> list[Row]:
+        """Return the equation with the material, Lame's constants too if there is one material, and the force."""
+        young, ratio = (section.get(name, getattr(cls, name)) for name in ("young", "poisson_ratio"))
+        said = (f"{value:g}" if isinstance(value, float | int) else value for value in (young, ratio))
+        material = "Young's modulus E = {}, Poisson's ratio ν = {}".format(*said)
+        if not isinstance(young, str) and not isinstance(ratio, str):
+            first, shear = young * ratio / ((1.0 + ratio) * (1.0 - 2.0 * ratio)), young / (2.0 * (1.0 + ratio))
+            material += f"; λ = {first:.6g}, μ = {shear:.6g}"
+        equation = "−∇·σ = f,  σ = λ (∇·u) I + μ (∇u + ∇uᵀ)"
+        force = section.get("body_force", "")
+        return [("equation", equation), ("material", material), ("force f per volume", force)]
+
+    def solve_options(self) -> SolveOptions:
+        """Return the options of the solve on the finest mesh; a slender body needs more iterations than a scalar."""
+        return replace(super().solve_options(), max_iterations=MOST_ITERATIONS, formulation=self.formulation)
+
+    @property
+    def units(self) -> Units:
+        """Return the units for colour bars."""
+        return Units(self.unit, self.stress_unit)
+
+    def problem(self) -> Elasticity:
+        """Return the problem of these options. Raises InputError."""
+        check_space(self.refine, self.degree)
+        loads = self.exact, self.body_force, self.displacement, self.traction, self.load, self.pressure, self.fix
+        if not any(loads):
+            raise InputError(
+                "nothing acts on the body, no load is given: --load 'nz > 0.9=0;0;-1', --pressure, "
+                "--body-force '0;0;-1', --traction or a displacement"
+            )
+        body = self._unchecked()
+        with input_errors():
+            body.demand_held()
+        return body
+
+    def check_law(self) -> None:
+        """Raise InputError for all but loads and supports that are missing."""
+        check_space(self.refine, self.degree)
+        replace(self, body_force=self.body_force or "0")._unchecked()
+
+    def _unchecked(self) -> Elasticity:
+        """Return the problem, whether the body is held or not. Raises InputError."""
+        from solve import Elasticity
+
+        traction = texts.faces("traction", self.traction)
+        with input_errors():
+            body = Elasticity(
+                exact=texts.vector("--exact", self.exact),
+                body_force=by_patch("--body-force", self.body_force, partial(texts.vector, "--body-force")),
+                displacement=texts.vector("--displacement", self.displacement),
+                traction={face: texts.vector(f"--traction {face}", text) for face, text in traction.items()},
+                young=modulus("--young", self.young),
+                poisson_ratio=modulus("--poisson-ratio", self.poisson_ratio),
+                conditions=self.conditions(3),
+            )
+        self.asks(body)
+        return body
+
+
+def modulus(flag: str, given: float | str) -> Any:
+    """Return a number of a material, or the numbers of each patch or solid. Raises InputError."""
+    return given if not isinstance(given, str) else texts.by_patch(flag, given, partial(texts.number, flag))
