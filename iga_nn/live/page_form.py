@@ -47,7 +47,8 @@ def _lists(kind: type[ProblemOptions]) -> list[tuple[str, str, str, str]]:
 
     They follow from the line of the option: "regions with a force per area, each as "REGION=VECTOR"".
     """
-    found, said = [], dict(_OPTION.findall(kind.__doc__ or ""))
+    found, docs = [], "\n".join(base.__doc__ or "" for base in kind.__mro__)
+    said = dict(_OPTION.findall(docs))
     for name in kind.on_regions():
         words = " ".join(said[name].split())
         forms = list(dict.fromkeys(re.findall(r"REGION(?:=[A-Z:]+)?", words))) or ["REGION"]

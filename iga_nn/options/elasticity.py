@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 from ..errors import InputError, input_errors
 from . import texts
-from .problem import Formula, ProblemOptions, Row, Sheet, Units, by_patch
+from .bodies import BodyOptions
+from .problem import Formula, Row, Sheet
 from .space_check import check_space
 
 if TYPE_CHECKING:
@@ -19,7 +20,7 @@ MOST_ITERATIONS = 3000  # of an elastic body; a bracket held at one end takes 68
 
 
 @dataclass(frozen=True)
-class ElasticityOptions(ProblemOptions):
+class ElasticityOptions(BodyOptions):
     """State linear elasticity of the volume as an isotropic body, and the meshes it is solved on.
 
     A face is one of u0, u1, v0, v1, w0, w1: the image of u = 0, u = 1 and so on. A vector is three formulas in x, y, z
@@ -29,7 +30,6 @@ class ElasticityOptions(ProblemOptions):
     Attributes:
         exact: exact displacement, a vector, from which force and boundary data follow; errors are reported. A vector
             that starts with a minus is written --exact="-x;0;0".
-        body_force: force per volume, a vector; zero where neither it nor exact is given; also one for each solid.
         displacement: displacement on the faces without traction, a vector; zero where neither it nor exact is given.
         traction: faces where a traction is given, each as "FACE=VECTOR", FACE=0 for a face that is free, or FACE for
             the traction of the exact solution.
@@ -39,17 +39,6 @@ class ElasticityOptions(ProblemOptions):
         poisson_ratio: Poisson's ratio nu, as young.
         formulation: "mixed" solves for displacement and pressure, as bodies that hardly change their volume need,
             "displacement" for the displacement alone; by default mixed where Poisson's ratio exceeds 0.45.
-        fix: regions of the boundary that are held, each as REGION, or "REGION=VECTOR" for a given displacement; an
-            entry of the vector that is left out is free: "x < 1=0;;". A region is a condition on position and outward
-            normal, "nz > 0.9 and x < 2", a face of the part, "face(x, y, z)", a group of the mesh, group:NAME, a
-            box(x0, y0, z0, x1, y1, z1) or a face of the cube. Where regions are given, all else of the boundary is
-            free.
-        roller: regions held along their normal only.
-        symmetry: regions where a plane of symmetry cuts the body; held along their normal as by a roller.
-        load: regions with a force per area, each as "REGION=VECTOR".
-        pressure: regions with a force per area against the outward normal, each as "REGION=FORMULA".
-        spring: regions on an elastic foundation, force per area and displacement, each as "REGION=FORMULA".
-        stress_unit: unit of stresses, such as MPa; free text that is shown behind stresses and changes no number.
 
     Examples:
         >>> import iga_nn
@@ -57,24 +46,14 @@ class ElasticityOptions(ProblemOptions):
         ['0', '0', '-1']
     """
 
-    body_force: Formula | None = None
     displacement: Formula | None = None
     traction: tuple[str, ...] = ()
     young: float | str = 1.0
     poisson_ratio: float | str = 0.3
     formulation: Literal["mixed", "displacement"] | None = None
-    fix: tuple[str, ...] = ()
-    roller: tuple[str, ...] = ()
-    symmetry: tuple[str, ...] = ()
-    load: tuple[str, ...] = ()
-    pressure: tuple[str, ...] = ()
-    spring: tuple[str, ...] = ()
-    stress_unit: str | None = None
 
     section: ClassVar[str] = "elasticity"
     title: ClassVar[str] = "linear elasticity"
-    essential: ClassVar[Row] = ("displacement u", "displacement")
-    natural: ClassVar[Row] = ("traction σ n", "traction")
     on_faces: ClassVar[tuple[str, ...]] = ("traction",)
     sheet: ClassVar[Sheet] = Sheet(
         "an elastic body",
@@ -105,16 +84,10 @@ class ElasticityOptions(ProblemOptions):
         """Return the options of the solve on the finest mesh; a slender body needs more iterations than a scalar."""
         return replace(super().solve_options(), max_iterations=MOST_ITERATIONS, formulation=self.formulation)
 
-    @property
-    def units(self) -> Units:
-        """Return the units for colour bars."""
-        return Units(self.unit, self.stress_unit)
-
     def problem(self) -> Elasticity:
         """Return the problem of these options. Raises InputError."""
         check_space(self.refine, self.degree)
-        loads = self.exact, self.body_force, self.displacement, self.traction, self.load, self.pressure, self.fix
-        if not any(loads):
+        if not (self.is_loaded or any((self.exact, self.displacement, self.traction))):
             raise InputError(
                 "nothing acts on the body, no load is given: --load 'nz > 0.9=0;0;-1', --pressure, "
                 "--body-force '0;0;-1', --traction or a displacement"
@@ -137,12 +110,11 @@ class ElasticityOptions(ProblemOptions):
         with input_errors():
             body = Elasticity(
                 exact=texts.vector("--exact", self.exact),
-                body_force=by_patch("--body-force", self.body_force, partial(texts.vector, "--body-force")),
                 displacement=texts.vector("--displacement", self.displacement),
                 traction={face: texts.vector(f"--traction {face}", text) for face, text in traction.items()},
                 young=modulus("--young", self.young),
                 poisson_ratio=modulus("--poisson-ratio", self.poisson_ratio),
-                conditions=self.conditions(3),
+                **self.of_body(),
             )
         self.asks(body)
         return body
