@@ -17,7 +17,8 @@ from volumes import spans_at
 
 from iga_nn.cli.commands import main
 from iga_nn.errors import InputError
-from iga_nn.io.formats import export, is_volume, load_volume
+from iga_nn.io.beginnings import is_volume
+from iga_nn.io.formats import export, load_volume
 from parameterize.spline.bernstein import binomials, elevation
 from parameterize.spline.body import Body
 from parameterize.spline.bspline import open_uniform_knots

@@ -9,7 +9,7 @@ from foreign_models import patch_files
 from glued import POINTS, demand_same
 
 import iga_nn
-from iga_nn.io.formats import is_volume
+from iga_nn.io.beginnings import is_volume
 from iga_nn.io.gismo import read_gismo, write_gismo
 from parameterize.spline.interface import axis_side, varying
 from parameterize.spline.volume import FACE_NAMES

@@ -235,10 +235,9 @@ def check(
         picture: PNG of the surface to write, with the regions in colours.
         force: replace an existing picture.
     """
-    from ..io.formats import is_volume, load_volume
+    from ..io.beginnings import is_volume
     from ..models import resolve
     from ..report import document as reports
-    from ..workflow.verdict import facts_of_file
     from . import answer
 
     if not is_volume(path):
@@ -255,6 +254,9 @@ def check(
     if surface != SurfaceOptions() or strict or region or picture:
         options = "--component, --close, --deflection, --max-faces, --decimate, --sharp, --strict, --region"
         raise InputError(f"{path}: is a volume; {options} and --picture are for surfaces")
+    from ..io.formats import load_volume
+    from ..workflow.verdict import facts_of_file
+
     facts = facts_of_file(Path(path), load_volume(path))
     _print(reports.as_json(facts) if as_json else answer.volume_in_words(facts))
     return answer.exit_code({"parameterization": facts})

@@ -9,7 +9,6 @@ for ParaView. IGES and STEP have no trivariate splines.
 """
 
 import logging
-import zipfile
 from collections.abc import Iterable, Sequence
 from dataclasses import fields
 from pathlib import Path
@@ -21,7 +20,6 @@ from parameterize.arrays import listed
 from parameterize.files import replacing
 from parameterize.spline.body import TOLERANCE, Body, BodyLike, as_body, shared_numbers
 from parameterize.spline.volume import BSplineVolume
-from parameterize.surface.readers.file import FORMATS as SURFACES
 from solve.discretization.space import TrialSpace, longest_edges
 from solve.field import BodyField, SplineField
 from solve.forms.boundary_value_problem import BoundaryValueProblem
@@ -31,39 +29,13 @@ from ..new_file import check_new
 from ..options import PROBLEMS
 from ..report import document as reports
 from ..type_check import check_type
-from .kinds import FORMATS, kind_of, read_body
+from .beginnings import kind_of
+from .kinds import FORMATS, read_body
 
 log = logging.getLogger(__name__)
 
 SHOWN = 3  # pairs of faces in a notice
-ALIKE = (".gltf", ".3mf")  # surfaces that begin as volumes do
 NARROWEST = 1e-100  # knot span: with the largest control points, derivatives stay within double precision
-
-
-def is_volume(path: str | Path) -> bool:
-    """Return whether a file is a volume (rather than a surface), by its ending .npz or by its beginning.
-
-    Surfaces begin alike (glTF as JSON, 3MF as a ZIP archive), so the ending must be one that is read here, for a volume
-    or for a surface that does not; a .zip is a volume where it holds arrays, of a .gz the ending before counts.
-    """
-    source = Path(path)
-    suffix = (Path(source.stem) if source.suffix.lower() == ".gz" else source).suffix.lower()
-    read = (kind.ending for kind in FORMATS.values() if kind.read)
-    endings = ("", ".zip", *read, *(ending for ending in SURFACES if ending not in ALIKE))
-    if suffix == ".npz":
-        return True
-    if suffix not in endings or not source.is_file() or kind_of(source) is None:
-        return False
-    return suffix != ".zip" or _holds_arrays(source)
-
-
-def _holds_arrays(path: Path) -> bool:
-    """Return whether an archive is one of numpy's."""
-    try:
-        with zipfile.ZipFile(path) as archive:
-            return any(name.endswith(".npy") for name in archive.namelist())
-    except (zipfile.BadZipFile, OSError, ValueError, NotImplementedError):
-        return False
 
 
 def load_volume(path: str | Path, tolerance: float = TOLERANCE) -> BodyLike:

@@ -10,7 +10,6 @@ geo_specs_mp_v10.txt and `geo_read_nurbs` of GeoPDEs.
 """
 
 import logging
-import re
 
 import numpy as np
 
@@ -18,12 +17,12 @@ from parameterize.arrays import Array
 from parameterize.spline.interface import Face
 from parameterize.spline.volume import AXES, FACE_NAMES, BSplineVolume
 
+from .beginnings import GEOPDES
 from .patches_of_files import patch_of, projected
 from .words import Words, faults_of, is_number
 
 log = logging.getLogger(__name__)
 
-HEADER = re.compile(r"^\s*#.*nurbs (?:mesh|geometry) v\.?(\d{1,3})\.", re.IGNORECASE | re.MULTILINE)
 HEAD = 4096  # characters in which it stands
 SHOWN = 6  # names in a notice
 PUNCTUATION = str.maketrans(",;[]", "    ")  # between the numbers of a row of MATLAB
@@ -32,7 +31,7 @@ PUNCTUATION = str.maketrans(",;[]", "    ")  # between the numbers of a row of M
 def read_geopdes(text: str) -> tuple[list[BSplineVolume], list[tuple[Face, Face]]]:
     """Return the patches, and the pairs of faces that the file declares glued. Raises ValueError with the line."""
     words = Words(text.translate(PUNCTUATION))
-    header = HEADER.search(text, 0, HEAD)
+    header = GEOPDES.search(text, 0, HEAD)
     old = header is not None and int(header[1]) < 1
     what = "the numbers of dimensions and patches"
     dimension, *rest = words.as_wholes(words.row(what), what)

@@ -64,7 +64,8 @@ from vtkmodules.vtkIOLegacy import vtkUnstructuredGridWriter
 from iga_nn.errors import InputError, input_errors, one_line
 from iga_nn.io import gismo, mfem_writer
 from iga_nn.io import splinepy as spline_files
-from iga_nn.io.formats import is_volume, load_volume
+from iga_nn.io.beginnings import is_volume
+from iga_nn.io.formats import load_volume
 from iga_nn.models import resolve
 from iga_nn.samples import sample
 from iga_nn.workflow.mapping import read_corners
