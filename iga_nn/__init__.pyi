@@ -14,6 +14,7 @@ from solve import Elasticity as Elasticity
 from solve import Form as Form
 from solve import Grading as Grading
 from solve import March as March
+from solve import Material as Material
 from solve import Modes as Modes
 from solve import Poisson as Poisson
 from solve import Problem as Problem
@@ -25,6 +26,7 @@ from solve import convergence as convergence
 from solve import discretize as discretize
 from solve import integrate as integrate
 from solve import march as march
+from solve import material as material
 from solve import modes as modes
 from solve import newton as newton
 from solve import resultant as resultant

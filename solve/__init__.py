@@ -29,6 +29,8 @@ from .field import BodyField as BodyField
 from .field import SplineField as SplineField
 from .forms.elasticity import Elasticity as Elasticity
 from .forms.form import Form as Form
+from .forms.library import material as material
+from .forms.material import Material as Material
 from .forms.parser import Expression as Expression
 from .forms.parser import ExpressionError as ExpressionError
 from .forms.poisson import Poisson as Poisson
