@@ -45,6 +45,12 @@ def test_of_a_scalar_law_what_flows_in_is_told():
     assert table(heat) == [["", "inflow"], ["Load", "3"], ["Value 'u0'", "-3"]]
 
 
+def test_values_on_the_faces_of_many_patches_are_one_sum():
+    each = {f"p{i}_u0": [0.5] for i in range(7)} | {"flux 'z < 1'": [1.0]}
+    heat = {"levels": [{"load": [-4.5], "reactions": each}]}
+    assert lines(heat) == ["load -4.5", "data on 7 faces answers 3.5", "flux 'z < 1' answers 1"]
+
+
 def test_what_older_reports_lack_is_not_told():
     for section in ({}, {"levels": []}, {"levels": [{"dofs": 8}]}, {"levels": [{"load": [1.0], "reactions": {}}]}):
         assert lines(section) == table(section) == []

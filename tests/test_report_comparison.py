@@ -30,7 +30,7 @@ def of(runs):
 
 
 def test_numbers_stand_beside_each_other_with_their_ratio(runs):
-    tables = comparison.rows(*of(runs))
+    tables = comparison.rows(of(runs))
     assert list(tables) == ["The map", "The finest solve", "Largest and smallest values", "Forces and flows", "Seconds"]
     extremes = {row[0]: row[1:] for row in tables["Largest and smallest values"]}
     assert extremes["largest displacement [mm]"][2] == "2"
@@ -44,7 +44,7 @@ def test_reactions_are_compared_by_their_lengths(runs):
     for run, size in ((one, 2.0), (other, 3.0)):
         finest = run.report["elasticity"]["levels"][-1]
         finest |= {"reactions": {"z < 1": [0.0, size, 0.0]}, "load": [0.0, -size, 0.0]}
-    assert comparison.rows(one, other)["Forces and flows"] == [
+    assert comparison.rows([one, other])["Forces and flows"] == [
         ["reaction on z < 1", "0, 2, 0", "0, 3, 0", "1.5"],
         ["load", "0, -2, 0", "0, -3, 0", "1.5"],
     ]
@@ -55,7 +55,7 @@ def test_a_volume_beside_a_solve_has_dashes(runs, in_folder):
     del report["elasticity"]
     (in_folder / "report.json").write_text(json.dumps(report))
     alone = comparison.Run.of(in_folder)
-    tables = comparison.rows(alone, of(runs)[0])
+    tables = comparison.rows([alone, of(runs)[0]])
     assert ["unknowns", "–", "375", "–"] in tables["The finest solve"]
 
 
@@ -84,3 +84,12 @@ def test_what_is_no_run_is_one_line(runs, in_folder, capsys):
         assert line.startswith(f"iga-nn: {says}")
     assert main(["compare", *map(str, runs), "--out", "x.txt"]) == 2
     assert Path("compare.html").read_text() == "mine"
+
+
+def test_several_runs_have_ratios_to_the_first(runs, in_folder, capsys):
+    assert main(["compare", str(runs[1]), str(runs[0]), str(runs[1])]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    (row,) = [line for line in lines if line.startswith("largest displacement [mm]")]
+    assert row.split()[-2:] == ["0.5", "1"]
+    page = Path("compare.html").read_text()
+    assert page.count("det J &gt; 0: certified") == 3 and "ratios are those to the first" in page

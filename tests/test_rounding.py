@@ -1,6 +1,7 @@
 """What is more than nothing is never shown as 0: seconds, memory, shares."""
 
 import logging
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
@@ -12,7 +13,7 @@ from iga_nn.cli.progress import describe, tell_batch
 from iga_nn.options import PoissonOptions
 from iga_nn.report import document as reports
 from iga_nn.report import html
-from iga_nn.rounding import rounded
+from iga_nn.rounding import distance, distortion, rounded
 from iga_nn.workflow import cost_estimate
 from iga_nn.workflow.output_folder import Outcome
 from parameterize.progress import Progress
@@ -72,3 +73,18 @@ def test_no_time_of_a_finished_solve_is_zero(in_folder, capsys):
     html.write(folder, report, None)
     page = (folder / "report.html").read_text()
     assert "below 0.1 s" in page and page.count("below 0.01") == len(report["seconds"])
+
+
+def test_rounding_errors_of_exact_blocks_are_no_figure():
+    assert distance(2.74e-16) == distance(5.7e-14) == distortion(3.8e-26) == "exact"
+    assert distance(3.31e-05) == "3.31e-05" and distortion(0.08572) == "0.08572"
+    unit = {"mean": 1.5e-26, "max": 3.8e-26}
+    apart = {"two_sided": {"of_diagonal": {"rms": 2.7e-16, "mean": 1e-16, "max": 5.7e-14}}}
+    quality = {"bijective": "certified", "boundary_injective": True, "orientation": "right-handed"}
+    quality |= {"control_points": [4, 4, 4], "degrees": [3, 3, 3], "arap": {"unit_volume": unit, "as_given": unit}}
+    report = {"parameterization": quality | {"surface_distance": apart, "boundary": {}}, "seconds": {"total": 1.0}}
+    facts = {name: (number, remark) for name, number, remark in html._facts(report)}
+    assert facts["ARAP distortion, mean"] == ("none", "at volume 1")
+    assert facts["Distance to the surface"] == ("exact", "surface to spline and back")
+    told = verdict_in_words(Outcome(Path("out"), report))
+    assert "exact: no distortion" in told and "exact; surface to spline and back" in told and "e-2" not in told

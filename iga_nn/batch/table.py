@@ -17,7 +17,7 @@ from ..level_table import csv_text
 from ..report import document as reports
 from ..report.artifacts import PAGE
 from ..report.html import filled
-from ..rounding import rounded
+from ..rounding import distance, distortion, rounded
 from ..version import __version__
 from ..workflow.worker_run import Ended
 from .surfaces import Entry, printable
@@ -168,7 +168,9 @@ def _text(name: str, value: Any) -> str:
         return "–"
     if isinstance(value, str):
         return value
-    return rounded(value, 0) if name in WHOLE else f"{value:.3g}"
+    if name in WHOLE:
+        return rounded(value, 0)
+    return distortion(value, 3) if name.startswith("arap") else distance(value)
 
 
 def _picture(path: Path) -> str:

@@ -10,7 +10,7 @@ from ..level_table import ESTIMATES, EXACT_ERRORS, TITLES
 from ..report import advice, asked, balance, extremes
 from ..report import document as reports
 from ..report.artifacts import PAGE
-from ..rounding import rounded
+from ..rounding import EXACT, distance, distortion, rounded
 from ..workflow.output_folder import Outcome
 from . import BAD_INPUT, DONE, NOT_CERTIFIED, NOT_SOLVED, NOT_THE_PART
 
@@ -52,9 +52,12 @@ def verdict_in_words(outcome: Outcome) -> str:
     if "patches" in outcome.report["parameterization"]:  # each against its own box: the unit changes nothing
         measured = {"own boxes": measured["as_given"]} if measured else {}
     for scale, arap in measured.items():
-        lines.append(f"{scale:16s} ARAP {arap['mean']:.4g} mean, {arap['max']:.4g} max")
-    if distance := verdict.get("surface_distance"):
-        said = f"rms {distance['rms']:.3g}, largest {distance['max']:.3g} of the box's diagonal"
+        mean, most = distortion(arap["mean"]), distortion(arap["max"])
+        said = "exact: no distortion" if most == EXACT else f"ARAP {mean} mean, {most} max"
+        lines.append(f"{scale:16s} {said}")
+    if apart := verdict.get("surface_distance"):
+        rms, most = distance(apart["rms"]), distance(apart["max"])
+        said = "exact" if most == EXACT else f"rms {rms}, largest {most} of the box's diagonal"
         lines.append(f"distance         {said}; surface to spline and back")
     if volume := reports.volume_in_words(outcome.report):
         lines.append(f"volume           {', '.join(volume)}")
@@ -107,11 +110,11 @@ def _patch(part: reports.Report) -> str:
 
 
 def surface_in_words(facts: dict[str, Any]) -> str:
-    """Return the facts of `check` about a surface as text, with a line for each group of faces and each region."""
+    """Return the facts of `check` about a surface as text: first a line for each region, last the groups."""
     others = {key: value for key, value in facts.items() if key not in ("groups", "regions")}
     groups = [f"{'group:':16s} {_group(found)}" for found in facts["groups"]]
     regions = [f"{'region:':16s} {_region(found)}" for found in facts.get("regions", ())]
-    return "\n".join([facts_in_words(others), *groups, *regions])
+    return "\n".join([*regions, facts_in_words(others), *groups])
 
 
 def _group(found: dict[str, Any]) -> str:

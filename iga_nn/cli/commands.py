@@ -324,22 +324,23 @@ def export_volume(
 
 
 @app.command(name="compare")
-def compare_runs(one: Path, other: Path, /, *, out: Path = Path("compare.html"), force: bool = False) -> None:
-    """Put two finished runs side by side: verdicts, errors, largest values and figures, in one page.
+def compare_runs(one: Path, other: Path, /, *more: Path, out: Path = Path("compare.html"), force: bool = False) -> None:
+    """Put finished runs side by side: verdicts, errors, largest values and figures, in one page.
 
     Args:
         one: output folder of a run.
         other: output folder of another run; ratios are its numbers over those of the first run.
+        more: output folders of further runs.
         out: page to write.
         force: replace an existing file.
     """
     from ..new_file import check_new, save_new
     from ..report import comparison
 
-    runs = comparison.Run.of(one), comparison.Run.of(other)
+    runs = [comparison.Run.of(folder) for folder in (one, other, *more)]
     target = check_new(out, ".html")
-    save_new(target, comparison.page(*runs).encode(), force)
-    _print(f"{comparison.as_text(*runs)}\nopen {target}")
+    save_new(target, comparison.page(runs).encode(), force)
+    _print(f"{comparison.as_text(runs)}\nopen {target}")
 
 
 @for_each_problem(page_app, is_default=True)

@@ -32,7 +32,7 @@ from .fields import (
     vectors_on,
     warp_of,
 )
-from .render import Patch, check_drawable, view_of
+from .render import TILT, Patch, check_drawable, widest_view
 from .style import color_bar, panels_of, save, show, show_around, show_inside
 
 MOST, COLUMNS = 6, 3  # modes
@@ -125,12 +125,13 @@ def draw_modes(path: str | Path | None, body: BodyLike, modes: Modes) -> Figure:
     figure, axes = panels_of(-(-len(shown) // COLUMNS), min(COLUMNS, len(shown)))
     places, samples = outer_faces(body), min(MODE_SAMPLES, sizes_of(body)[0])
     size, still = as_body(body).size, on_planes(maps_of(body), places, samples)
+    view = widest_view(still.reshape(-1, 3), TILT)  # of the body at rest: one for all modes
     for panel, (frequency, shape) in zip(axes.flat, shown, strict=False):
         moved = on_planes(vectors_on(shape), places, samples)
         far = np.linalg.norm(moved, axis=-1)
         limits = ColorRange(0.0, float(far.max()))
         patch = Patch(still + SWING * size / limits.high * moved, limits.colors(far), every=samples - 1)
-        show(panel, f"{frequency:.4g} Hz", [patch], view_of([patch]))
+        show(panel, f"{frequency:.4g} Hz", [patch], view)
     return save(figure, path, "The lowest modes, coloured by their displacement")
 
 

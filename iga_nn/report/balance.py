@@ -3,12 +3,16 @@
 For elasticity these are forces, for a scalar law inflows. The unit of forces is that of stresses times that of areas.
 """
 
+import math
+import re
 from typing import Any
 
 from ..level_table import capitalized
 
 AXES = ("x", "y", "z")
 NEWTON = {("MPa", "mm"), ("N/mm²", "mm"), ("N/mm^2", "mm"), ("Pa", "m"), ("N/m²", "m"), ("N/m^2", "m")}
+FACE = re.compile(r"(p\d+_)?[uvw][01]")  # of a patch
+MOST_FACES = 6  # whose reactions stand one by one; more are one sum
 TINY = 1e-6  # of the largest number: the linear solver's own error is smaller
 
 
@@ -27,7 +31,7 @@ def table(section: dict[str, Any]) -> list[list[str]]:
         return []
     unit = unit_of(section)
     head = [f"{axis}{unit and f' [{unit}]'}" for axis in AXES] if _is_force(section) else ["inflow"]
-    rows = [("load", level["load"]), *level["reactions"].items()]
+    rows = [("load", level["load"]), *_reactions(level).items()]
     shown = [["", *head], *([capitalized(role), *_numbers(values, level)] for role, values in rows)]
     if "imbalance" in level:
         shown.append(["Imbalance, relative", f"{level['imbalance']:.1e}", *[""] * (len(head) - 1)])
@@ -40,13 +44,23 @@ def lines(section: dict[str, Any]) -> list[str]:
     if not level.get("reactions"):
         return []
     unit = unit_of(section)
-    rows = [("load", level["load"]), *((f"{role} answers", force) for role, force in level["reactions"].items())]
+    rows = [("load", level["load"]), *((f"{role} answers", force) for role, force in _reactions(level).items())]
     return [f"{said} {_vector(_numbers(values, level))}{unit and f' {unit}'}" for said, values in rows]
 
 
 def _finest(section: dict[str, Any]) -> dict[str, Any]:
     levels: list[dict[str, Any]] = section.get("levels") or [{}]
     return levels[-1]
+
+
+def _reactions(level: dict[str, Any]) -> dict[str, list[float]]:
+    """Return the reactions by support; those of the faces of many patches are one sum."""
+    faces = [role for role in level["reactions"] if FACE.fullmatch(role)]
+    if len(faces) <= MOST_FACES:
+        return dict(level["reactions"])
+    rest = {role: force for role, force in level["reactions"].items() if role not in set(faces)}
+    total = [math.fsum(parts) for parts in zip(*(level["reactions"][role] for role in faces), strict=True)]
+    return {f"data on {len(faces):,} faces": total, **rest}
 
 
 def _is_force(section: dict[str, Any]) -> bool:

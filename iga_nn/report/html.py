@@ -18,7 +18,7 @@ from parameterize.old_names import ORIGINS
 
 from ..errors import one_line
 from ..level_table import TITLES, as_rows, capitalized
-from ..rounding import rounded
+from ..rounding import EXACT, distance, distortion, rounded
 from . import asked, balance, extremes
 from . import document as reports
 from .advice import in_words
@@ -145,10 +145,15 @@ def _facts(report: Report) -> list[tuple[str, str, str]]:
     if "arap" in quality:
         arap = quality["arap"]["unit_volume"]
         measured = "each block in its own box" if "patches" in quality else "at volume 1"
-        facts.append(("ARAP distortion, mean", f"{arap['mean']:.4g}", f"largest {arap['max']:.4g}; {measured}"))
-    if distance := reports.surface_distance(report):
-        remark = f"rms over the box's diagonal, surface to spline and back; largest {distance['max']:.3g}"
-        facts.append(("Distance to the surface", f"{distance['rms']:.3g}", remark))
+        mean, most = distortion(arap["mean"]), distortion(arap["max"])
+        remark = measured if most == EXACT else f"largest {most}; {measured}"
+        facts.append(("ARAP distortion, mean", "none" if most == EXACT else mean, remark))
+    if apart := reports.surface_distance(report):
+        rms, most = distance(apart["rms"]), distance(apart["max"])
+        remark = "surface to spline and back"
+        if most != EXACT:
+            remark = f"rms over the box's diagonal, {remark}; largest {most}"
+        facts.append(("Distance to the surface", rms, remark))
     if volume := reports.volume_in_words(report):
         number, beside = volume
         facts.append(("Volume", number, beside))
@@ -224,8 +229,8 @@ def _patch(patch: Report) -> dict[str, str]:
         return found
     return found | {
         "own box": " × ".join(f"{side:.3g}" for side in patch["own_box"]),
-        "ARAP, mean": f"{patch['arap']['mean']:.3g}",
-        "largest": f"{patch['arap']['max']:.3g}",
+        "ARAP, mean": distortion(patch["arap"]["mean"], 3),
+        "largest": distortion(patch["arap"]["max"], 3),
         "least scaled det J": f"{patch['scaled_jacobian']:.3g}",
     }
 

@@ -1,7 +1,7 @@
 """Shows a result in a notebook: its facts as a table, without pictures."""
 
 import heapq
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import asdict
 from functools import singledispatch
 from typing import Any
@@ -19,6 +19,7 @@ from solve.solution import Solution
 from solve.study import Convergence
 
 from ..level_table import as_rows
+from ..rounding import distortion
 from . import asked
 from . import document as reports
 from .html import filled
@@ -98,7 +99,7 @@ def _of_patch(certificate: PatchCertificate) -> str:
 def _quality(quality: QualityReport) -> str:
     report = {"parameterization": quality.as_dict()}
     rows = [
-        ("ARAP distortion: mean, max", *_both(quality.arap)),
+        ("ARAP distortion: mean, max", *_both(quality.arap, distortion)),
         ("boundary at the mesh's vertices: rms, mean, max", *_both(quality.boundary)),
         ("mesh to spline: rms, mean, max", *_both(quality.mesh_to_spline)),
         ("spline to mesh: rms, mean, max", *_both(quality.spline_to_mesh)),
@@ -114,8 +115,8 @@ def _patches(patches: Sequence[BoxDistortion]) -> str:
         (
             f"p{i}",
             _times([f"{side:.3g}" for side in one.box]),
-            f"{one.arap.mean:.4g}",
-            f"{one.arap.max:.4g}",
+            distortion(one.arap.mean),
+            distortion(one.arap.max),
             f"{one.scaled_jacobian:.3g}",
         )
         for i, one in _shown(patches)
@@ -150,8 +151,8 @@ def _study(study: Convergence) -> str:
     return _table("Convergence", rows, head, notices=notices)
 
 
-def _both(measure: BothScales[Any]) -> list[str]:
-    return [", ".join(f"{value:.4g}" for value in asdict(m).values()) for m in (measure.unit_volume, measure.as_given)]
+def _both(measure: BothScales[Any], shown: Callable[[float], str] = "{:.4g}".format) -> list[str]:
+    return [", ".join(map(shown, asdict(m).values())) for m in (measure.unit_volume, measure.as_given)]
 
 
 def _times(counts: Sequence[object]) -> str:
