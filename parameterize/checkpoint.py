@@ -26,6 +26,7 @@ KEPT = {  # the checkpoints of a run by their names, in the order of its stages,
     "spline": "the rounds of the spline",
     "knots": "the refinement",
     "solve": "the levels that are solved",
+    "steps": "the load steps",
 }
 _ANEW = "start anew with --force instead of --resume"
 _DAMAGED = "remove this file to continue from an earlier checkpoint, or start anew with --force"

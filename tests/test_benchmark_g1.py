@@ -202,7 +202,7 @@ def test_a_solve_that_does_not_converge_is_a_status(formula, monkeypatch):
     def stopped(volume, problem, options):
         return solve.solve_with(volume, problem, replace(options, max_iterations=1))
 
-    monkeypatch.setattr("iga_nn.workflow.solving.solve_with", stopped)
+    monkeypatch.setattr("solve.solve_with", stopped)
     assert g1.main(formula) == 1
     row = table(Path("out"))["duck"]
     assert "did not converge" in row["status"] and row["iterations_refine_0"] == "1"

@@ -122,7 +122,7 @@ def test_solve_that_does_not_converge_is_exit_code_4(monkeypatch, in_folder):
     def stopped(volume, problem, options):
         return solve.solve_with(volume, problem, replace(options, max_iterations=1))
 
-    monkeypatch.setattr("iga_nn.workflow.solving.solve_with", stopped)
+    monkeypatch.setattr("solve.solve_with", stopped)
     benchmark_volume(6).save("volume.npz")
     assert main(["solve", "poisson", "volume.npz", "--refine", "0", "--out", "out"]) == 4
     section = json.loads(Path("out/report.json").read_text())["poisson"]
@@ -668,7 +668,7 @@ def test_checkpoint_of_another_run_is_said(formula_training, in_folder, capsys):
 def test_a_refused_checkpoint_costs_no_file(formula_training, in_folder, capsys, monkeypatch):
     formula_training()
     with monkeypatch.context() as patched:
-        patched.setattr("iga_nn.workflow.solving.solve_with", lambda *_, **__: 1 / 0)
+        patched.setattr("solve.solve_with", lambda *_, **__: 1 / 0)
         with pytest.raises(ZeroDivisionError):
             main(["run", "poisson", "cube"])
     before = sorted(Path("cube").iterdir())

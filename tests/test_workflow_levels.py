@@ -14,7 +14,6 @@ from plane_bodies import arrays
 
 import iga_nn
 from iga_nn.cli.commands import main
-from iga_nn.workflow import solving
 from solve import ConvergenceError, solve_with
 from solve.study import benchmark_volume
 
@@ -37,7 +36,7 @@ def ending(monkeypatch):
                 raise error
             return solve_with(body, problem, options)
 
-        monkeypatch.setattr(solving, "solve_with", solve)
+        monkeypatch.setattr("solve.solve_with", solve)
         return begun
 
     return install
@@ -197,8 +196,7 @@ def test_a_study_keeps_what_is_solved(in_folder, monkeypatch):
 CHILD = """
 import os, signal, sys
 import iga_nn.figures.render, iga_nn.workflow.pipeline
-from contextlib import nullcontext
-from iga_nn.workflow import solving
+import solve as package
 from parameterize.spline.sampled_boundary import SampledBoundary
 from small_run import FEW
 from solve import solve_with
@@ -210,7 +208,7 @@ def solve(body, problem, options):
         os.kill(os.getpid(), signal.{name})
     return solve_with(body, problem, options)
 
-solving.solve_with = solve
+package.solve_with = solve
 sys.argv = ["iga-nn", *{arguments!r}]
 from iga_nn.__main__ import run_and_exit
 run_and_exit()

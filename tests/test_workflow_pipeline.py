@@ -32,7 +32,7 @@ def test_run_returns_what_it_wrote(formula_training, in_folder):
 
 def test_volume_and_report_outlive_a_failing_solve(formula_training, in_folder, monkeypatch):
     formula_training()
-    monkeypatch.setattr("iga_nn.workflow.solving.solve_with", lambda *_, **__: 1 / 0)
+    monkeypatch.setattr("solve.solve_with", lambda *_, **__: 1 / 0)
     with pytest.raises(ZeroDivisionError):
         iga_nn.run("poisson", "cube", "out")
     assert (in_folder / "out" / "volume.npz").exists()
@@ -49,7 +49,7 @@ def test_a_refused_solve_leaves_a_page_of_the_map(formula_training, in_folder):
         raise ValueError("exact is not finite at x=0.5")
 
     with pytest.MonkeyPatch.context() as patched, pytest.raises(InputError, match="not finite"):
-        patched.setattr("iga_nn.workflow.solving.solve_with", refuse)
+        patched.setattr("solve.solve_with", refuse)
         iga_nn.run("poisson", "cube", "out", poisson=iga_nn.PoissonOptions(solve_anyway=True))
     report = json.loads((in_folder / "out" / "report.json").read_text())
     assert report["not_solved"] == "exact is not finite at x=0.5" and "total" not in report["seconds"]
@@ -107,7 +107,7 @@ def test_the_checkpoint_stays_until_all_is_solved(formula_training, in_folder, m
     checkpoint.touch()
     again = MapOptions(resume=True)
     with monkeypatch.context() as patched:
-        patched.setattr("iga_nn.workflow.solving.solve_with", lambda *_, **__: 1 / 0)
+        patched.setattr("solve.solve_with", lambda *_, **__: 1 / 0)
         with pytest.raises(ZeroDivisionError):
             iga_nn.run("poisson", "cube", "out", mapping=again)
     assert checkpoint.exists()
@@ -121,7 +121,7 @@ def test_a_map_that_was_changed_is_not_kept(formula_training, in_folder, monkeyp
     """An interrupted run goes on with the map of its report, and not with a volume of 8 times its size."""
     formula_training()
     with monkeypatch.context() as patched:
-        patched.setattr("iga_nn.workflow.solving.solve_with", lambda *_, **__: 1 / 0)
+        patched.setattr("solve.solve_with", lambda *_, **__: 1 / 0)
         with pytest.raises(ZeroDivisionError):
             iga_nn.run("poisson", "cube", "out", mapping=MapOptions(resume=True))
     made = iga_nn.load_volume("out/volume.npz")

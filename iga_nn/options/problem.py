@@ -13,7 +13,9 @@ from ..type_check import Checked
 from . import texts
 
 if TYPE_CHECKING:
-    from solve import Ask, SolveOptions
+    from parameterize.checkpoint import Checkpoints
+    from parameterize.spline.body import BodyLike
+    from solve import Ask, Solution, SolveOptions
     from solve.forms.boundary_value_problem import BoundaryValueProblem
     from solve.forms.conditions import Condition
 
@@ -95,6 +97,17 @@ class ProblemOptions(Checked, ABC):
     def check_law(self) -> None:
         """Raise InputError as `problem`, but for loads and supports that are missing: a form may add these."""
         self.problem()
+
+    def solved(
+        self, body: BodyLike, problem: BoundaryValueProblem, options: SolveOptions, checkpoints: Checkpoints
+    ) -> Solution:
+        """Return the solution on one level.
+
+        A law with load steps keeps each of them as the checkpoint "steps", and goes on from the one that is there.
+        """
+        from solve import solve_with
+
+        return solve_with(body, problem, options)
 
     @classmethod
     @abstractmethod

@@ -274,7 +274,7 @@ def solve_to(
         if unsolved:
             return None if state is None else _finish(state, loaded)
         if state is None:
-            deque(each_level(loaded, problem, problem_options.levels, options), maxlen=0)
+            deque(each_level(loaded, problem, problem_options, problem_options.levels, options), maxlen=0)
             return None
         solution = solve_levels(state, loaded, problem, problem_options, options)
         return _finish(state, loaded, solution, problem, problem_options.units)

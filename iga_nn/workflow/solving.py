@@ -9,8 +9,9 @@ from typing import Any
 
 import numpy as np
 
+from parameterize.checkpoint import Checkpoints
 from parameterize.spline.body import BodyLike, as_body
-from solve import ConvergenceError, ConvergenceRow, Modes, Solution, SolveOptions, SolveReport, rates, solve_with
+from solve import ConvergenceError, ConvergenceRow, Modes, Solution, SolveOptions, SolveReport, rates
 from solve.forms.boundary_value_problem import BoundaryValueProblem
 from solve.forms.frame import UnitFrame
 
@@ -52,7 +53,7 @@ def solve_levels(
         return _show(state, body, done, problem, problem_options) if done.refine else ()
 
     with reported(state, body, lambda: done.missing(problem_options.refine), show), state.timed("solve"):
-        for level, more, solution in _each(body, problem, problem_options, options, done):
+        for level, more, solution in _each(body, problem, problem_options, options, done, kept):
             entry = more | level_of(solution)
             solution.save(state.folder / SOLUTION)
             done.add(level, entry, solution)
@@ -68,14 +69,21 @@ def solve_levels(
 
 
 def _each(
-    body: BodyLike, problem: BoundaryValueProblem, problem_options: ProblemOptions, options: SolveOptions, done: Levels
+    body: BodyLike,
+    problem: BoundaryValueProblem,
+    problem_options: ProblemOptions,
+    options: SolveOptions,
+    done: Levels,
+    kept: KeptLevels | None,
 ) -> Iterator[tuple[int, dict[str, Any], Solution]]:
     """Yield the levels that are left: how often spans are halved, what their entry has beside, and the solution."""
     if problem_options.wanted is not None:
         yield from each_step(body, problem, problem_options.wanted, options, done)
         return
     left = problem_options.levels[len(done.refine) :]
-    for level, solution in zip(left, each_level(body, problem, left, options), strict=True):
+    checkpoints = None if kept is None else kept.checkpoints
+    solutions = each_level(body, problem, problem_options, left, options, checkpoints)
+    for level, solution in zip(left, solutions, strict=True):
         yield level, {}, solution
 
 
@@ -131,16 +139,22 @@ def level_of(solution: Solution) -> dict[str, Any]:
 
 
 def each_level(
-    body: BodyLike, problem: BoundaryValueProblem, levels: Sequence[int], options: SolveOptions
+    body: BodyLike,
+    problem: BoundaryValueProblem,
+    problem_options: ProblemOptions,
+    levels: Sequence[int],
+    options: SolveOptions,
+    checkpoints: Checkpoints | None = None,
 ) -> Iterator[Solution]:
     """Solve level after level and yield the solutions; the solve of a scalar problem starts at the last solution.
 
-    All processes of an MPI job call this together.
+    checkpoints: for the load steps of each level. All processes of an MPI job call this together.
     """
     for level in sorted(levels):
+        steps = Checkpoints.none() if checkpoints is None else checkpoints.of_part(f"level{level}")
         try:
             with input_errors():
-                solution = solve_with(body, problem, replace(options, refine=level))
+                solution = problem_options.solved(body, problem, replace(options, refine=level), steps)
         except MemoryError:
             remedy = "free some, lower --refine, or share the solve: mpiexec -n 4 iga-nn solve ... --mpi"
             raise InputError(f"refine {level}: the memory does not suffice; {remedy}") from None
