@@ -3,8 +3,6 @@
 from itertools import zip_longest
 from typing import Any
 
-from parameterize.arrays import listed
-
 from ..batch.table import Batch
 from ..level_table import ESTIMATES, EXACT_ERRORS, TITLES
 from ..report import advice, asked, balance, extremes
@@ -13,6 +11,7 @@ from ..report.artifacts import PAGE
 from ..rounding import EXACT, distance, distortion, rounded
 from ..workflow.output_folder import Outcome
 from . import BAD_INPUT, DONE, NOT_CERTIFIED, NOT_SOLVED, NOT_THE_PART
+from .facts import facts_in_words
 
 CODES = {  # of a state
     "certified": DONE,
@@ -21,7 +20,6 @@ CODES = {  # of a state
     "not solved": NOT_SOLVED,
 }
 SHOWN_ERRORS = (*EXACT_ERRORS, *ESTIMATES)
-MOST_SHOWN = 40  # entries of a list
 
 
 def exit_code(report: reports.Report) -> int:
@@ -107,36 +105,3 @@ def _patch(part: reports.Report) -> str:
     size, degrees = reports.size_in_words(part), ", ".join(map(str, part["degrees"]))
     hand = "" if part["orientation"] == "right-handed" else f", {part['orientation']}"
     return f"{part['bijective']}, {size} control points, degrees {degrees}{hand}"
-
-
-def surface_in_words(facts: dict[str, Any]) -> str:
-    """Return the facts of `check` about a surface as text: first a line for each region, last the groups."""
-    others = {key: value for key, value in facts.items() if key not in ("groups", "regions")}
-    groups = [f"{'group:':16s} {_group(found)}" for found in facts["groups"]]
-    regions = [f"{'region:':16s} {_region(found)}" for found in facts.get("regions", ())]
-    return "\n".join([*regions, facts_in_words(others), *groups])
-
-
-def _group(found: dict[str, Any]) -> str:
-    shape = f": {found['shape']}" if "shape" in found else ""
-    return f"{found['name']}, {found['faces']} faces, area {found['area']:.6g}{shape}"
-
-
-def _region(found: dict[str, Any]) -> str:
-    count = "1 triangle" if found["triangles"] == 1 else f"{found['triangles']} triangles"
-    return f"{found['region']}, area {found['area']:.6g}, {found['share']:.2%} of the surface, {count}"
-
-
-def facts_in_words(facts: dict[str, Any]) -> str:
-    """Return the facts of `check` as text, one a line."""
-    return "\n".join(f"{key + ':':16s} {_text(value)}" for key, value in facts.items())
-
-
-def _text(value: Any) -> str:
-    if isinstance(value, float):
-        return f"{value:.6g}"
-    if isinstance(value, dict):
-        return "; ".join(f"{key} {_text(item)}" for key, item in value.items())
-    if isinstance(value, list | tuple):
-        return listed([_text(item) for item in value], MOST_SHOWN) or "none"
-    return str(value)

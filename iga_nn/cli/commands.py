@@ -236,28 +236,38 @@ def check(
         force: replace an existing picture.
     """
     from ..io.beginnings import is_volume
+
+    if is_volume(path):
+        if surface != SurfaceOptions() or strict or region or picture:
+            options = "--component, --close, --deflection, --max-faces, --decimate, --sharp, --strict, --region"
+            raise InputError(f"{path}: is a volume; {options} and --picture are for surfaces")
+        return _check_volume(Path(path), as_json)
     from ..models import resolve
+    from .facts import surface_in_words
+
+    given = resolve(path, **surface.reading())
+    if strict:
+        given.refuse_crossings()
+    facts = given.summary()
+    if region or picture:
+        from ..workflow.regions import looked_at
+
+        facts |= {"regions": looked_at(region, given, picture, force)}
+    if as_json:
+        from ..report.document import as_json as json_text
+
+    _print(json_text(facts) if as_json else "accepted\n" + surface_in_words(facts))
+    return DONE
+
+
+def _check_volume(path: Path, as_json: bool) -> int:
+    """Certify a volume, print the verdict and return the exit code."""
+    from ..io.formats import load_volume
     from ..report import document as reports
+    from ..workflow.verdict import facts_of_file
     from . import answer
 
-    if not is_volume(path):
-        given = resolve(path, **surface.reading())
-        if strict:
-            given.refuse_crossings()
-        facts = given.summary()
-        if region or picture:
-            from ..workflow.regions import looked_at
-
-            facts |= {"regions": looked_at(region, given, picture, force)}
-        _print(reports.as_json(facts) if as_json else "accepted\n" + answer.surface_in_words(facts))
-        return DONE
-    if surface != SurfaceOptions() or strict or region or picture:
-        options = "--component, --close, --deflection, --max-faces, --decimate, --sharp, --strict, --region"
-        raise InputError(f"{path}: is a volume; {options} and --picture are for surfaces")
-    from ..io.formats import load_volume
-    from ..workflow.verdict import facts_of_file
-
-    facts = facts_of_file(Path(path), load_volume(path))
+    facts = facts_of_file(path, load_volume(path))
     _print(reports.as_json(facts) if as_json else answer.volume_in_words(facts))
     return answer.exit_code({"parameterization": facts})
 

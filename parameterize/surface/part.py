@@ -5,7 +5,6 @@ from functools import cached_property
 from typing import Any
 
 import igl
-import numba
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -18,7 +17,6 @@ from .nearest import shares_of
 NEAR = 1e-6  # of the box's diagonal: triangles whose distances differ by less are equally near
 THIN = 1e-6  # of the box's diagonal: the normal of a lower triangle is rounding
 TIED = 1e-9  # of the box's diagonal: the same where no normal is given, which could prefer a farther one
-AGREES = 1e-6  # a triangle is preferred where its cosine is larger by more than this
 SHARP = 30.0  # degrees
 ROUNDING = 1e-12  # of a cosine: an edge that bends by just the angle is crossed
 # A triangle whose cosine with a point's normal is less than ASIDE belongs to another face of the part, if one that
@@ -77,6 +75,8 @@ class PartSurface(Brief):
         only where none that agrees better is near, as beside the rim of a bore. Without normals it is the one with the
         lowest number.
         """
+        from .part_kernels import best_aligned
+
         where = np.ascontiguousarray(points, dtype=np.float64)
         squared, index, _ = self._tree.squared_distance(self.vertices, self.faces, where)
         found = np.asarray(index, dtype=np.int64).reshape(-1)
@@ -91,7 +91,7 @@ class PartSurface(Brief):
         given = np.ascontiguousarray(normals, dtype=np.float64)
         given = given / np.maximum(np.linalg.norm(given, axis=1, keepdims=True), np.finfo(np.float64).tiny)
         starts, around = self._around
-        best = _best_aligned(where, given, reach, found, self.vertices, self.faces, self.normals, starts, around)
+        best = best_aligned(where, given, reach, found, self.vertices, self.faces, self.normals, starts, around)
         aside = np.flatnonzero(np.sum(self.normals[best] * given, axis=1) < ASIDE)
         cells = np.unique(np.round(_ALIKE * given[aside]), axis=0, return_inverse=True)[1].ravel()
         for cell in range(cells.max(initial=-1) + 1):
@@ -105,6 +105,8 @@ class PartSurface(Brief):
         A triangle may be flat, or a chord of a curved surface: it is known no better. So points between it and the
         surface that bends with the neighbours' normals have the offset zero, others that to the nearer one.
         """
+        from .part_kernels import nearest_in_triangles
+
         chosen = self.nearest(points, normals)
         corners = self.vertices[self.faces[chosen]]  # (k, 3, 3)
         feet = nearest_in_triangles(np.ascontiguousarray(points), self.vertices, self.faces[chosen])
@@ -142,9 +144,11 @@ class PartSurface(Brief):
 
     def _first(self, point: Array, reach: float, found: int) -> int:
         """Return the lowest number of the triangles at the corners of one that lie within `reach` of a point (3,)."""
+        from .part_kernels import distance
+
         starts, around = self._around
         near = {int(t) for corner in self.faces[found] for t in around[starts[corner] : starts[corner + 1]]}
-        return min((t for t in near if _distance(point, self.vertices, self.faces[t]) <= reach), default=found)
+        return min((t for t in near if distance(point, self.vertices, self.faces[t]) <= reach), default=found)
 
     def _alignment(self, points: Array, normals: Array, best: IntArray) -> IntArray:
         """Return the triangles (k,) near points (k, 3) that face as normals (k, 3), all much alike; else `best`."""
@@ -213,64 +217,3 @@ class PartSurface(Brief):
         order = np.argsort(self.faces.ravel(), kind="stable")
         counts = np.bincount(self.faces.ravel(), minlength=len(self.vertices))
         return np.concatenate([[0], np.cumsum(counts)]), order // 3
-
-
-@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def _best_aligned(
-    points: Array,
-    given: Array,
-    reach: Array,
-    found: IntArray,
-    vertices: Array,
-    faces: IntArray,
-    normals: Array,
-    starts: IntArray,
-    around: IntArray,
-) -> IntArray:
-    """Return the best aligned triangles (k,) within `reach` (k,) among the triangles at the corners of `found` (k,)."""
-    best = found.copy()
-    for i in range(len(points)):
-        agreement = np.dot(normals[found[i]], given[i])
-        for corner in faces[found[i]]:
-            for t in around[starts[corner] : starts[corner + 1]]:
-                other = np.dot(normals[t], given[i])
-                if other > agreement + AGREES and _distance(points[i], vertices, faces[t]) <= reach[i]:
-                    best[i], agreement = t, other
-    return best
-
-
-@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def nearest_in_triangles(points: Array, vertices: Array, faces: IntArray) -> Array:
-    """Return the point (k, 3) of each triangle that is nearest to each point (k, 3): in its inside, or on a side."""
-    found = np.empty_like(points)
-    for i in range(len(points)):
-        corners = vertices[faces[i]]
-        normal = np.cross(corners[1] - corners[0], corners[2] - corners[0])
-        size, inside, least = np.dot(normal, normal), True, np.inf
-        for k in range(3):
-            start, along = corners[k], corners[(k + 1) % 3] - corners[k]
-            away = points[i] - start
-            inside = inside and np.dot(np.cross(along, away), normal) >= 0.0
-            share = min(max(np.dot(away, along) / max(np.dot(along, along), 1e-300), 0.0), 1.0)
-            foot = start + share * along
-            squared = np.dot(points[i] - foot, points[i] - foot)
-            if squared < least:
-                found[i], least = foot, squared
-        if inside and size > 0.0:
-            found[i] = points[i] - (np.dot(points[i] - corners[0], normal) / size) * normal
-    return found
-
-
-@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def _distance(point: Array, vertices: Array, face: IntArray) -> float:
-    """Return the distance of a point (3,) to a triangle: to its inside, or to the nearest of its sides."""
-    normal = np.cross(vertices[face[1]] - vertices[face[0]], vertices[face[2]] - vertices[face[0]])
-    inside, nearest = True, np.inf
-    for k in range(3):
-        start, end = vertices[face[k]], vertices[face[(k + 1) % 3]]
-        along, away = end - start, point - start
-        inside = inside and np.dot(np.cross(along, away), normal) >= 0.0
-        share = np.dot(away, along) / max(np.dot(along, along), 1e-300)
-        nearest = min(nearest, float(np.linalg.norm(away - min(max(share, 0.0), 1.0) * along)))
-    size = float(np.linalg.norm(normal))
-    return float(abs(np.dot(point - vertices[face[0]], normal))) / size if inside and size > 0.0 else nearest
