@@ -75,6 +75,8 @@ class Ask:
     def __post_init__(self) -> None:
         if not isinstance(self.text, str):
             raise ExpressionError(f"ask must be text, such as {FORMS}, got {type(self.text).__name__}")
+        if not isinstance(self.surface, Part | None):
+            raise ExpressionError(f"{self.role}: surface must be a Part, got {type(self.surface).__name__}")
         text = " ".join(self.text.split())
         found = next((match for pattern in _PATTERNS if (match := pattern.fullmatch(text))), None)
         if found is None:

@@ -100,6 +100,8 @@ def test_faces_alone_are_known_as_faces():
         ("u0 < 1", "is a condition, where a number must stand"),
         ("x < (y < 1)", "is a condition, where a number must stand"),
         ("box(1, 2)", r"write box\(x0, y0, z0, x1, y1, z1\)"),
+        ("plane q=0", "faces of a solid model are 'bore 2'"),
+        ("bore", "faces of a solid model are 'bore 2'"),
         ("face(1, 2)", r"write face\(x, y, z\)"),
         ("face(a, b, c)", r"write face\(x, y, z\)"),
         ("face(1, 2, 3, -5)", "an angle is from 0 to 180"),

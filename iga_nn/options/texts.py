@@ -11,6 +11,7 @@ from ..errors import InputError
 if TYPE_CHECKING:
     from solve.forms.conditions import Condition
 
+SMALLEST_SHARE = 1e-8  # what the linear solver leaves is 1e-10
 _EQUALS = re.compile("(?<![<>=])=(?!=)")
 _OWNER = re.compile(r"""(?:^|,)\s*("[^"]*"|'[^']*'|[^,:"']*[^,:"'\s])\s*:""")
 _PATCH = re.compile(r"p(\d+)")
@@ -109,6 +110,6 @@ def share(flag: str, given: str | float) -> float:
         found = float(text.removesuffix("%")) / (100.0 if text.endswith("%") else 1.0)
     except ValueError:
         found = -1.0
-    if not 0.0 < found < 1.0:
-        raise InputError(f"{flag} {text!r:.80}: give a share such as 2% or 0.02")
+    if not SMALLEST_SHARE <= found < 1.0:
+        raise InputError(f"{flag} {text!r:.80}: give a share such as 2% or 0.02, {SMALLEST_SHARE:g} or larger")
     return found

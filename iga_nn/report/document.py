@@ -208,7 +208,7 @@ def asked(report: Report) -> list[Report]:
 
 def accuracy_in_words(refined: Report) -> str:
     """Return what became of the accuracy that was wanted of a solve."""
-    wanted, steps = f"{100.0 * refined['accuracy']:g} %", f"{refined['steps']} steps"
+    wanted, steps = f"{100.0 * refined['accuracy']:g} %", f"{refined['steps']} step{'s' * (refined['steps'] != 1)}"
     return f"{wanted} reached in {steps}" if refined["reached"] else f"{wanted} not reached: {refined['stopped']}"
 
 

@@ -27,6 +27,8 @@ NAMED = re.compile(  # of a solid model: a face, or what its reader calls some o
     rf"\b(?:(?P<kind>bore|shaft|fillet|round)\s+(?P<number>\d+)|face(?P<face>\d+)"
     rf"|radius\s+(?P<radius>{NUMBER})|plane\s+(?P<axis>[xyz])\s*=\s*(?P<place>{NUMBER}))(?![\w.])"
 )
+NEARLY_NAMED = re.compile(r"\b(?:bore|shaft|fillet|round|radius|plane)\b")
+NAMED_FORMS = "'bore 2', 'shaft 1', 'fillet 1', 'round 1', 'radius 8', 'plane z=0' or 'face4'"
 GROUP = re.compile(r"""group:("[^"]*"|'[^']*'|[^\s()]+)""")
 ANGLE = 30.0  # degrees between neighbouring triangles beyond which an edge is sharp
 # The tolerance of positions, of the diagonal of the points' box, and of the components of normals: rounding is some
@@ -155,6 +157,8 @@ class Region:
             for entry in marks[len(FACE_NAMES) :]:
                 _check_mark(entry)
         except ExpressionError as error:
+            if NEARLY_NAMED.search(text):
+                raise ExpressionError(f"region {self.text!r:.80}: faces of a solid model are {NAMED_FORMS}") from None
             raise ExpressionError(f"region {self.text!r:.80}: {_readable(str(error), marks)}") from None
         for name, value in (("_marks", tuple(marks)), ("_used", frozenset(translator.used)), ("_decide", decide)):
             object.__setattr__(self, name, value)

@@ -179,7 +179,13 @@ def _run(data: bytes, kind: str, deflection: float | None, unit: Unit) -> tuple[
     with tempfile.TemporaryDirectory() as folder:
         source, target = Path(folder, "source"), Path(folder, "target.npz")
         source.write_bytes(data)
-        numbers = (unit.working, 0.0 if deflection is None else deflection * unit.factor, SHARE, ANGLE, unit.factor)
+        numbers = (
+            unit.working,
+            0.0 if deflection is None else float(deflection) * unit.factor,
+            SHARE,
+            ANGLE,
+            unit.factor,
+        )
         command = [sys.executable, str(PROGRAM), str(source), str(target), kind, *map(repr, numbers)]
         try:
             ended = subprocess.run(
