@@ -3,7 +3,7 @@
 from collections import defaultdict
 from collections.abc import Hashable, Sequence
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -17,11 +17,13 @@ from .discretization.groups import CoefficientLayout, OnPatches
 from .discretization.on_regions import Stated, renewed, weak_faces
 from .discretization.operator import FormOperator, Operator
 from .discretization.roughness import Measured, rules_of
+from .discretization.shared_out import shared_out
 from .discretization.space import TrialSpace
-from .discretization.unknowns import Unknowns
+from .discretization.unknowns import Unknowns, Window
 from .discretization.weak import WeakFace
 from .field import Points
 from .forms.boundary_value_problem import BoundaryValueProblem
+from .forms.conditions import Condition
 from .forms.form import Form, check_law
 from .forms.mass import Mass, WithMass
 from .forms.problem import Problem
@@ -32,11 +34,21 @@ LARGEST_IMBALANCE = 0.01  # of the data's size; quadrature leaves far less of da
 
 
 class Assembled(NamedTuple):
-    """Hold the matrix of a body, and for each patch the loads and the fixed coefficients (c, n_u, n_v, n_w)."""
+    """Hold the matrix of a body, and for each patch the loads and the fixed coefficients (c, n_u, n_v, n_w).
+
+    conditions: those of the body on regions, with what their totals come to at each point.
+    """
 
     matrix: BodyMatrix
     loads: OnPatches
     known: OnPatches
+    conditions: tuple[Condition, ...]
+
+    def stated(self, patches: Sequence[Any]) -> list[Any]:
+        """Return the problems on patches, with what their totals come to at each point."""
+        if not patches[0].problem.has_totals:
+            return list(patches)
+        return [stated_by(patch, patch.problem.sharing(self.conditions)) for patch in patches]
 
     def shifted(self, factors: Array) -> "Assembled":
         """Return the same with the mass in the matrix, times the factor (n,) of each patch."""
@@ -65,16 +77,48 @@ class Assembled(NamedTuple):
             for law, patch, same in each
         ]
         _, loads = assemble_body(matrix.layout, laws, matrix.parts[0].threads)
-        if patches[0].problem.conditions:
+        conditions = patches[0].problem.conditions
+        if conditions:
+            conditions = shared_out(conditions, matrix.weak, patches[0].space)
+            stated = [patch.problem.sharing(conditions) for patch in patches]
             for face in matrix.weak:
-                _add_load(renewed(face, patches[face.patches[0]].problem), loads)
+                _add_load(renewed(face, stated[face.patches[0]]), loads)
         else:
             _on_faces(patches, _in_volumes(patches), loads)
-        return Assembled(matrix, loads, _known(patches, matrix.layout))
+        return Assembled(matrix, loads, _known(patches, matrix.layout), conditions)
 
 
-def assemble_body_data(patches: Sequence[Stated], options: SolveOptions) -> Assembled:
-    """Return the matrix, the loads with the data on faces and regions, and the fixed coefficients of all patches."""
+def assemble_body_data(patches: Sequence[Stated], options: SolveOptions, unknowns: Unknowns | None = None) -> Assembled:
+    """Return the matrix, the loads with the data on faces and regions, and the fixed coefficients of all patches.
+
+    patches: those of this process. unknowns: those of all processes that share the body; by default one has all of it.
+    """
+    shared, conditions = unknowns or Window(patches[0].space), patches[0].problem.conditions
+    has_totals = patches[0].problem.has_totals
+    with shared.agreed():
+        matrix, loads, same = _in_volume(patches, options)
+        with patches[0].space.agreed():
+            nominal = [stated_by(patch, patch.problem.nominal()) for patch in patches] if has_totals else patches
+            terms: Sequence[Any] = weak_faces(nominal, same) if conditions else _on_faces(patches, same, loads)
+    if has_totals:
+        conditions = shared_out(conditions, terms, shared.processes)
+    with shared.agreed(), patches[0].space.agreed():
+        if has_totals:
+            stated = [patch.problem.sharing(conditions) for patch in patches]
+            terms = [renewed(face, stated[face.patches[0]]) for face in terms]
+        for face in terms if conditions else ():
+            _add_load(face, loads)
+        known = _known(patches, loads.layout)
+    return Assembled(matrix.with_faces(terms), loads, known, conditions)
+
+
+def stated_by(patch: Any, problem: BoundaryValueProblem) -> Any:
+    """Return what is stated on a patch with another problem."""
+    return patch._replace(problem=problem) if isinstance(patch, OnePatch) else replace(patch, problem=problem)
+
+
+def _in_volume(patches: Sequence[Stated], options: SolveOptions) -> tuple[BodyMatrix, OnPatches, list[Hashable]]:
+    """Return the matrix, the loads of the source, and for each patch the number of its law and source."""
     couples, same = _check_laws(patches), _in_volumes(patches)
     measured = [
         Measured(patch.volume, patch.space, patch.problem.form.tensor, law)
@@ -86,11 +130,7 @@ def assemble_body_data(patches: Sequence[Stated], options: SolveOptions) -> Asse
         component = 0 if form.components == 1 and form.symmetric and not couples else None
         laws.append(Law(patch.volume, patch.space, rule, form, source, component, law))
     layout = CoefficientLayout.of([patch.space for patch in patches])
-    matrix, loads = assemble_body(layout, laws, options.thread_count)
-    with patches[0].space.agreed():
-        on_boundary = _on_regions if patches[0].problem.conditions else _on_faces
-        terms = on_boundary(patches, same, loads)
-    return Assembled(matrix.with_faces(terms), loads, _known(patches, layout))
+    return *assemble_body(layout, laws, options.thread_count), same
 
 
 def _known(patches: Sequence[Stated], layout: CoefficientLayout) -> OnPatches:
@@ -144,8 +184,8 @@ def assemble_data(
 
     The load and the coefficients have the shape (c, n_u, n_v, n_w).
     """
-    matrix, loads, known = assemble_body_data([OnePatch(volume, problem, space)], options)
-    return matrix.parts[0], loads[0], known[0]
+    found = assemble_body_data([OnePatch(volume, problem, space)], options)
+    return found.matrix.parts[0], found.loads[0], found.known[0]
 
 
 class OnePatch(NamedTuple):
@@ -185,14 +225,6 @@ def _alike(patches: Sequence[Stated], same: Sequence[Hashable], name: str) -> li
         if name in space.outer and name not in space.dirichlet:
             found[space.key, law, patch.problem.key_on(name)].append(place)
     return [np.array(places) for places in found.values() if has_face(patches[places[0]].space, name)]
-
-
-def _on_regions(patches: Sequence[Stated], same: Sequence[Hashable], loads: OnPatches) -> list[WeakFace]:
-    """Add the data on regions of the boundary to loads, and return the terms; `same` as for `_on_faces`."""
-    faces = weak_faces(patches, same)
-    for face in faces:
-        _add_load(face, loads)
-    return faces
 
 
 def _add_load(face: WeakFace, loads: OnPatches) -> None:

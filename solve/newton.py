@@ -169,7 +169,8 @@ class _Balance:
         """
         problems: list[Any] = [UnderLaw(patch.problem, _Simple(patch.problem.form.components)) for patch in patches]
         simple = [OnePatch(own.volume, one, own.space) for own, one in zip(patches, problems, strict=True)]
-        matrix, loads, known = assemble_body_data(simple, options)
+        found = assemble_body_data(simple, options)
+        matrix, loads, known = found.matrix, found.loads, found.known
         demand_area(problem, matrix.weak, patches[0].space, body.patches)
         if len(body.parts) > 1 and not problem.form.has_reaction:
             free = surveyed(matrix).free

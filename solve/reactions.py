@@ -193,7 +193,8 @@ def _add_regions(problem: BoundaryValueProblem, face: WeakFace, coefficients: Ar
             x, weights = part_of(face.x, chosen), face.weights[chosen]
             free = np.eye(len(outside))[:, :, None] - face.projector[:, :, chosen]
             given = condition.flux_at(problem, x, face.normal[:, chosen])
-            pull = condition.factor_at(x) * face.traces(coefficients)[0][:, chosen]
+            u = np.einsum("cdm,dm->cm", free, face.traces(coefficients)[0][:, chosen])
+            pull = np.einsum("cdm,dm->cm", condition.factors_at(len(u), x, face.normal[:, chosen]), u)
             found[condition.role] += (weights * np.einsum("cdm,dm->cm", free, given - pull)).sum(axis=1)
             outside += (weights * np.einsum("cdm,dm->cm", free, given)).sum(axis=1)
     return outside

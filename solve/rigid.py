@@ -131,9 +131,8 @@ def _on_faces(face: FaceTerm, part: Sequence[int], motions: Affine) -> Iterator[
 
 def _by_region(face: WeakFace, own: Mask, moves: Array) -> Support:
     """Return the support of own points (m,) of faces with regions; moves (k, c, m)."""
-    held = np.einsum("cdm,kdm->kcm", face.projector, moves)
-    held[..., face.factor > 0.0] = moves[..., face.factor > 0.0]
-    here = own & ((np.einsum("ccm->m", face.projector) > 0.5) | (face.factor > 0.0))
+    held = np.einsum("cdm,kdm->kcm", face.holding, moves)
+    here = own & ((np.einsum("ccm->m", face.projector) > 0.5) | face.is_sprung)
     return _rows(moves[..., here]), _rows(held[..., here])
 
 

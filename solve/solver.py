@@ -172,9 +172,8 @@ def check_problem(body: BodyLike, problem: BoundaryValueProblem, comm: Any = Non
     _, patches = on_patches(glued, problem, options)
     unknowns = shared_unknowns(glued, [patch.space for patch in patches], comm)
     own = [patches[number] for number in unknowns.patches]
-    with unknowns.agreed():
-        matrix, loads, _ = assemble_body_data(own, options)
-    faces = matrix.weak
+    found = assemble_body_data(own, options, unknowns)
+    faces, loads = found.matrix.weak, found.loads
     demand_area(problem, faces, unknowns.processes, glued.patches)
     if problem.fixes_nothing and problem.conditions:
         demand_supports(problem, faces, unknowns.processes, glued.patches)

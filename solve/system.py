@@ -483,8 +483,7 @@ def build(
     start = time.process_time()
     with one_blas_thread():
         unknowns = shared_unknowns(body, [patch.space for patch in patches], options.comm)
-        with unknowns.agreed():
-            found = assemble_body_data([patches[number] for number in unknowns.patches], options)
+        found = assemble_body_data([patches[number] for number in unknowns.patches], options, unknowns)
         system = system_of(body, problem, patches, unknowns, found, is_loose)
     return replace(system, setup=time.process_time() - start)
 
@@ -499,6 +498,7 @@ def system_of(
 ) -> System:
     """Return the system of `build` from the unknowns and what is assembled on the patches of this process."""
     matrix, loads = found.matrix, found.loads
+    problem, patches = problem.sharing(found.conditions), found.stated(patches)
     known = matrix.layout.joined(unknowns.completed(found.known))
     systems = systems_of([patches[number] for number in unknowns.patches], found._replace(known=known))
     components = loads.components

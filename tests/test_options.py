@@ -26,11 +26,15 @@ OTHERS = {
     | SCALAR
     | {"neumann": ("u1=1",), "robin": ("u1=1:1",), "value": ("x < 1=1",), "flux": ("x < 1=1",)}
     | {"exchange": ("x < 1=1:1",)},
-    ElasticityOptions(body_force="2;2;2"): SPACE
+    ElasticityOptions(body_force="2;2;2", density=1.0, gravity="0;0;1"): SPACE
     | VECTOR
     | {"traction": ("u1=1;1;1",), "young": 2.0, "poisson_ratio": 0.25, "formulation": "mixed"}
     | {"fix": ("x < 1",), "roller": ("x < 1",)}
-    | {"symmetry": ("x < 1",), "load": ("x < 1=1;1;1",), "pressure": ("x < 1=1",), "spring": ("x < 1=1",)},
+    | {"symmetry": ("x < 1",), "load": ("x < 1=1;1;1",), "pressure": ("x < 1=1",), "spring": ("x < 1=1",)}
+    | dict.fromkeys(("total_spring", "foundation"), ("x < 1=1",))
+    | dict.fromkeys(("total_force", "moment", "bearing"), ("x < 1=1;1;1",))
+    | dict.fromkeys(("turn", "hydrostatic", "remote_force"), ("x < 1=1;1;1 at (0, 0, 1)",))
+    | {"density": 2.0, "gravity": "0;1;0", "acceleration": "1;0;0", "spin": "0;0;1 at (0, 0, 0)"},
 }
 
 
@@ -73,7 +77,7 @@ def test_every_problem_is_a_command_of_each_group(group, problem, capsys):
     assert main([group, problem, "--help"]) == 0
     said, kind = capsys.readouterr().out, PROBLEMS[problem]
     for name in (*kind.on_regions(), *kind.on_faces):
-        assert f"--{name} " in said
+        assert f"--{name.replace('_', '-')} " in said
 
 
 def test_a_batch_and_a_study_of_a_body_ask_for_its_data(in_folder, capsys):
@@ -86,7 +90,7 @@ def test_a_batch_and_a_study_of_a_body_ask_for_its_data(in_folder, capsys):
 
 def test_a_spring_has_a_value_outside_on_the_command_line_too():
     options = ElasticityOptions(spring=("u0=7", "v0=x:0;0;1"), load=("u1=0;0;1",))
-    assert [one.text for one in options.problem().conditions] == ["0;0;1", "7", "x, outside 0;0;1"]
+    assert [one.text for one in options.problem().conditions] == ["7", "x, outside 0;0;1", "0;0;1"]
 
 
 def test_auto_takes_its_limits_to_the_map():

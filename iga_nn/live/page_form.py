@@ -51,8 +51,9 @@ def _lists(kind: type[ProblemOptions]) -> list[tuple[str, str, str, str]]:
     said = dict(_OPTION.findall(docs))
     for name in kind.on_regions():
         words = " ".join(said[name].split())
-        forms = list(dict.fromkeys(re.findall(r"REGION(?:=[A-Z:]+)?", words))) or ["REGION"]
+        forms = list(dict.fromkeys(re.findall(r"REGION(?:=[A-Z:]+(?: at POINT)?)?", words))) or ["REGION"]
         after = "" if "REGION" in forms else "=0;0;0" if "VECTOR" in forms[0] else "="
+        after += " at (0, 0, 0)" * ("POINT" in forms[0])
         label = re.split(r", each as|[;.]", words)[0]
         found.append((name, label[0].upper() + label[1:], f"{' or '.join(forms)}, one a line", after))
     return found

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..errors import InputError, input_errors
 from ..type_check import Checked
-from .elasticity import modulus
+from . import texts
 from .space_check import check_level, check_space
 
 if TYPE_CHECKING:
@@ -79,7 +79,7 @@ class ModesOptions(Checked):
     @property
     def densities(self) -> Any:
         """Return the density, or that of each patch or solid. Raises InputError."""
-        return modulus("--density", self.density)
+        return texts.numbers("--density", self.density)
 
     def problem(self) -> Elasticity:
         """Return the body, without loads. Raises InputError."""
@@ -92,7 +92,7 @@ class ModesOptions(Checked):
         free = {} if self.fix or self.roller else dict.fromkeys(FACE_NAMES, ["0"] * 3)
         with input_errors():
             check_modes(self.densities, self.number)
-            young, ratio = modulus("--young", self.young), modulus("--poisson-ratio", self.poisson_ratio)
+            young, ratio = texts.numbers("--young", self.young), texts.numbers("--poisson-ratio", self.poisson_ratio)
             return Elasticity(
                 traction=free, young=young, poisson_ratio=ratio, fix=self.fix or None, roller=self.roller or None
             )

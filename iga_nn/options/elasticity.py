@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 from ..errors import InputError, input_errors
@@ -62,9 +61,10 @@ class ElasticityOptions(BodyOptions):
             ("young", "Young's modulus E", "1"),
             ("poisson_ratio", "Poisson's ratio ν", "0.3"),
             ("body_force", "Force per volume, three formulas", "0;0;0"),
+            *BodyOptions.mass_fields,
             ("stress_unit", "Unit of stresses, such as MPa", "none"),
         ),
-        {"young": "E", "poisson_ratio": "ν", "body_force": "f"},
+        {"young": "E", "poisson_ratio": "ν", "body_force": "f", "gravity": "g", "acceleration": "a", "spin": "ω"},
     )
 
     @classmethod
@@ -78,7 +78,8 @@ class ElasticityOptions(BodyOptions):
             material += f"; λ = {first:.6g}, μ = {shear:.6g}"
         equation = "−∇·σ = f,  σ = λ (∇·u) I + μ (∇u + ∇uᵀ)"
         force = section.get("body_force", "")
-        return [("equation", equation), ("material", material), ("force f per volume", force)]
+        rows = [("equation", equation), ("material", material), ("force f per volume", force)]
+        return [*rows, *cls.mass_rows(section)]
 
     def solve_options(self) -> SolveOptions:
         """Return the options of the solve on the finest mesh; a slender body needs more iterations than a scalar."""
@@ -89,8 +90,8 @@ class ElasticityOptions(BodyOptions):
         check_space(self.refine, self.degree)
         if not (self.is_loaded or any((self.exact, self.displacement, self.traction))):
             raise InputError(
-                "nothing acts on the body, no load is given: --load 'nz > 0.9=0;0;-1', --pressure, "
-                "--body-force '0;0;-1', --traction or a displacement"
+                "nothing acts on the body, no load is given: --total-force 'nz > 0.9=0;0;-1', --load, --pressure, "
+                "--body-force '0;0;-1', --gravity, --traction or a displacement"
             )
         body = self._unchecked()
         with input_errors():
@@ -112,14 +113,9 @@ class ElasticityOptions(BodyOptions):
                 exact=texts.vector("--exact", self.exact),
                 displacement=texts.vector("--displacement", self.displacement),
                 traction={face: texts.vector(f"--traction {face}", text) for face, text in traction.items()},
-                young=modulus("--young", self.young),
-                poisson_ratio=modulus("--poisson-ratio", self.poisson_ratio),
+                young=texts.numbers("--young", self.young),
+                poisson_ratio=texts.numbers("--poisson-ratio", self.poisson_ratio),
                 **self.of_body(),
             )
         self.asks(body)
         return body
-
-
-def modulus(flag: str, given: float | str) -> Any:
-    """Return a number of a material, or the numbers of each patch or solid. Raises InputError."""
-    return given if not isinstance(given, str) else texts.by_patch(flag, given, partial(texts.number, flag))

@@ -15,6 +15,7 @@ SMALLEST_SHARE = 1e-8  # what the linear solver leaves is 1e-10
 _EQUALS = re.compile("(?<![<>=])=(?!=)")
 _OWNER = re.compile(r"""(?:^|,)\s*("[^"]*"|'[^']*'|[^,:"']*[^,:"'\s])\s*:""")
 _PATCH = re.compile(r"p(\d+)")
+_AT_POINT = re.compile(r"(.*)\sat\s*\((.*)\)\s*")
 _OF_REGION = re.compile("\"[^\"]*\"|'[^']*'|plane\\s+[xyz]\\s*=")  # quoted text, and planes of a solid model
 
 
@@ -52,18 +53,21 @@ def datum(kind: type[Condition], entries: int, text: str) -> Any:
 
     An entry of a vector that is left out leaves the component of a support free.
     """
-    from solve.forms.conditions import Exchange, Spring
+    from solve.forms.conditions import Exchange, Foundation, Spring
 
+    flag = "--" + kind.option.replace("_", "-")
+    if kind.has_point:
+        return at_point(flag, text)
     if issubclass(kind, Exchange):
         factor, colon, outside = text.partition(":")
-        if not colon and issubclass(kind, Spring):
+        if issubclass(kind, Foundation) or (not colon and issubclass(kind, Spring)):
             return text
         if not (factor.strip() and outside.strip()):
             raise InputError(f"{kind.kind} {text!r:.80}: write REGION=ALPHA:OUTSIDE, such as 'nz > 0.9=25:20'")
-        return factor, outside if entries == 1 else vector(f"--{kind.kind}", outside)
+        return factor, outside if entries == 1 else vector(flag, outside)
     if entries == 1:
         return text
-    parts = vector(f"--{kind.kind}", text)
+    parts = vector(flag, text)
     return [entry if entry.strip() else None for entry in parts or ()] if kind.is_essential else parts
 
 
@@ -76,6 +80,15 @@ def vector(flag: str, text: str | None) -> list[str] | None:
         form = "write three formulas with semicolons between them, such as '0;0;-1', or 0 for none"
         raise InputError(f"{flag} {text!r:.80}: {form}")
     return entries
+
+
+def at_point(flag: str, text: str) -> tuple[list[str], list[str]]:
+    """Return the vector and the point of "0;0;-500 at (10, 0, 50)". Raises InputError for another text."""
+    found = _AT_POINT.fullmatch(text)
+    parts, point = (found[1].split(";"), found[2].split(",")) if found else ([], [])
+    if len(parts) != 3 or len(point) != 3:
+        raise InputError(f"{flag} {text!r:.80}: write a vector and a point, such as '0;0;-500 at (10, 0, 50)'")
+    return parts, point
 
 
 def by_patch(flag: str, text: str, read: Callable[[str], Any]) -> Any:
@@ -93,6 +106,11 @@ def by_patch(flag: str, text: str, read: Callable[[str], Any]) -> Any:
         forms = "'steel: 1, pad: 2', or a patch, 'p0: 1, p1: 2'"
         raise InputError(f"{flag} {text!r:.80}: write one entry a solid, {forms}")
     return {owner: read(entry.strip()) for owner, entry in zip(owners, rest[1::2], strict=True)}
+
+
+def numbers(flag: str, given: float | str) -> Any:
+    """Return a number, or the numbers of each patch or solid. Raises InputError."""
+    return given if not isinstance(given, str) else by_patch(flag, given, lambda text: number(flag, text))
 
 
 def number(flag: str, text: str) -> float:

@@ -16,6 +16,7 @@ from ..discretization.on_regions import Acting, codes_on
 from ..field import BodyField, Points
 from ..field_groups import FieldGroup, groups_of
 from ..forms.boundary_value_problem import BoundaryValueProblem
+from ..forms.conditions import Pressure
 from ..forms.form import Quantity, reaction
 from ..quantities import at_places
 from ..solution import Solution
@@ -41,8 +42,8 @@ class Given:
     """Hold the data at m points of the boundary, and how they change along the outward normal.
 
     projector: (c, c, m), onto the directions along which u is given. value_slope: (c, m), of the values there. loads,
-    load_slope: (c, m), the flux into a body with u = 0, outside of the projector. factor, factor_slope: (m,), of an
-    exchange. pressure: (m,), which acts along the normal. pressure_slope: (3, m), its gradient.
+    load_slope: (c, m), the flux into a body with u = 0, outside of the projector. factor, factor_slope: (c, c, m), of u
+    in an exchange. pressure: (m,), which acts along the normal. pressure_slope: (3, m), its gradient.
     """
 
     projector: Array
@@ -205,7 +206,7 @@ class _Traces:
         def every(u: Array, grad: Array, x: Array) -> Array:
             along = grad - np.einsum("cam,am,bm->cbm", grad, self.normal, self.normal)
             held = np.einsum("cdm,dm->cm", self.given.projector, steep)
-            pull = loads - self.given.factor * u
+            pull = loads - np.einsum("cdm,dm->cm", self.given.factor, u)
             slope = np.where(known, self._slope(u, along + held[:, None] * self.normal, x, pull) + held, steep)
             found = along + slope[:, None] * self.normal
             flux = np.asarray(form.flux(u, found, x), dtype=np.float64)
@@ -280,7 +281,7 @@ class _GivenData:
             codes = codes_on(self.problem, nets, names)(self.x, self.normal, owners)
             acting = Acting(self.problem, self.x, self.normal, self.weights, codes)
             for i, condition in enumerate(self.problem.conditions):
-                if condition.is_along_normal and not condition.is_essential and condition.datum is not None:
+                if isinstance(condition, Pressure) and condition.datum is not None:
                     here = acting.holding(i)
                     pressure += np.where(here, condition.datum(self.x)[0], 0.0)
                     slopes = [self._slope(condition.datum, axis) for axis in np.eye(3)]
@@ -316,7 +317,8 @@ class _GivenData:
         c, m = self.problem.form.components, x.shape[1]
         if self.name in self.problem.dirichlet:
             unit = np.eye(c)[:, :, None] * np.ones(m)
-            return unit, self.problem.boundary_at(x, self.name), np.zeros((c, m)), np.zeros(m)
+            return unit, self.problem.boundary_at(x, self.name), np.zeros((c, m)), np.zeros((c, c, m))
         alpha, loads = self.problem.on_face(self.name, x, self.normal)
         nothing = np.zeros((c, c, m)), np.zeros((c, m))
-        return *nothing, np.broadcast_to(loads, (c, m)), np.zeros(m) if alpha is None else alpha
+        factor = np.eye(c)[:, :, None] * (np.zeros(m) if alpha is None else alpha)
+        return *nothing, np.broadcast_to(loads, (c, m)), factor

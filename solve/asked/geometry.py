@@ -92,8 +92,9 @@ def density(piece: BoundaryPiece, z: Values) -> Array:
 def _of_fluxes(piece: BoundaryPiece, z: Values, slope_u: Array, slope_z: Array) -> Array:
     """Return the part (m,) of given fluxes and exchanges."""
     given, is_pressed = piece.given, piece.given.pressure.any()
-    flux = given.loads - given.factor * piece.u.u
-    steeper = given.load_slope - given.factor_slope * piece.u.u - given.factor * slope_u
+    flux = given.loads - np.einsum("cdm,dm->cm", given.factor, piece.u.u)
+    steeper = given.load_slope - np.einsum("cdm,dm->cm", given.factor_slope, piece.u.u)
+    steeper = steeper - np.einsum("cdm,dm->cm", given.factor, slope_u)
     if is_pressed:  # its direction turns with the surface
         flux = flux + given.pressure * piece.normal
         steeper = steeper + (given.pressure_slope * piece.normal).sum(axis=0) * piece.normal

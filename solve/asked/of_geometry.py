@@ -9,6 +9,8 @@ import numpy as np
 from parameterize.spline.interface import axis_side
 
 from ..field import BodyField
+from ..forms.boundary_value_problem import BoundaryValueProblem
+from ..forms.conditions import Foundation, shares_out
 from ..mixed import MixedSystem
 from ..solution import Solution
 from ..system import System
@@ -38,6 +40,8 @@ def of_geometry(
     surface = surface or surface_of(solution, functionals)
     if surface is None:
         return [NO_SURFACE] * len(functionals)
+    if why := _why_no_change(solution.problem):
+        return [why] * len(functionals)
     own = [OwnChange.of(one, solution) for one in functionals]
     adjoints = [_adjoint(system, solution, one) for one in own]
     chosen = [number for number, z in enumerate(adjoints) if isinstance(z, BodyField)]
@@ -51,6 +55,12 @@ def of_geometry(
         change = found[number].change + own[number].beside(surface)
         found[number] = replace(found[number], change=change, wider=wider)
     return [found[number] if isinstance(z, BodyField) else z for number, z in enumerate(adjoints)]
+
+
+def _why_no_change(problem: BoundaryValueProblem) -> str:
+    """Return which condition changes with the surface in a way that the density lacks; "" where none does."""
+    found = [one for one in problem.conditions if shares_out(one) or isinstance(one, Foundation)]
+    return f"{found[0].role} changes with the surface" if found else ""
 
 
 def _adjoint(system: System, solution: Solution, own: OwnChange) -> BodyField | str:

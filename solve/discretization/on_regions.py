@@ -149,7 +149,7 @@ def demand_supports(
 
     Arguments as in `demand_area`; for a body that no Dirichlet data hold.
     """
-    holding = [face.weights * (np.einsum("ccm->m", face.projector) + (face.factor > 0.0)) for face in faces]
+    holding = [face.weights * (np.einsum("ccm->m", face.projector) + face.is_sprung) for face in faces]
     area = processes.total(sum(float(weights.sum()) for weights in holding))
     if not problem.form.free_motions(np.zeros((3, 1))).size:
         return
@@ -160,8 +160,7 @@ def demand_supports(
     moved = held = 0.0
     for face, weights in zip(faces, holding, strict=True):
         motions = problem.form.free_motions((np.asarray(face.x) - middle[:, None]) / size)
-        sprung = face.factor > 0.0
-        kept = np.where(sprung, motions, np.einsum("cdm,kdm->kcm", face.projector, motions))
+        kept = np.einsum("cdm,kdm->kcm", face.holding, motions)
         moved = moved + np.einsum("kcm,lcm,m->kl", motions, motions, face.weights * (weights > 0.0))
         held = held + np.einsum("kcm,lcm,m->kl", kept, kept, face.weights)
     free = _unheld(processes.total(moved) / area, processes.total(held) / area)
@@ -207,10 +206,11 @@ def codes_on(problem: BoundaryValueProblem, nets: Array, names: Sequence[str], s
 
 
 def renewed(face: WeakFace, problem: BoundaryValueProblem) -> WeakFace:
-    """Return a face with the loads and values of another problem, whose conditions act on the same regions."""
+    """Return a face with the loads, values and factors of another problem, whose conditions act on the same regions."""
     acting = Acting(problem, face.x, face.normal, face.weights, face.codes)
     projector, values = acting.held()
-    return replace(face, values=values, loads=acting.natural(projector)[0])
+    loads, factor = acting.natural(projector)
+    return replace(face, values=values, loads=loads, factor=factor)
 
 
 @dataclass(frozen=True, eq=False)
@@ -265,12 +265,12 @@ class Acting:
         return "(" + ", ".join(f"{value:.4g}" for value in self.x[:, point]) + ")"
 
     def natural(self, projector: Array) -> tuple[Array, Array]:
-        """Return the given flux into the body (c, m), beside held directions, and the factor (m,) of exchanges.
+        """Return the given flux into the body (c, m), beside held directions, and the factor (c, c, m) of exchanges.
 
         Raises ValueError where a load acts on a held part of the boundary.
         """
-        loads, factor = np.zeros((self.problem.form.components, len(self.weights))), np.zeros(len(self.weights))
-        named = np.zeros(len(factor), dtype=bool)
+        c, m = self.problem.form.components, len(self.weights)
+        loads, factor, named = np.zeros((c, m)), np.zeros((c, c, m)), np.zeros(m, dtype=bool)
         for i, condition in enumerate(self.problem.conditions):
             here = np.flatnonzero(self.holding(i))
             named[here] = True
@@ -284,12 +284,15 @@ class Acting:
                 self._refuse_load(condition, wrong[0])
             loads[:, here] += found
             if condition.factor is not None:
-                factor[here] += condition.factor_at(points)
+                factor[:, :, here] += condition.factors_at(c, points, self.normal[:, here])
         rest = np.flatnonzero((self.codes & 1 == 1) & ~named | self._partly_held(projector, named))
         if self.problem.exact_formulas and len(rest):
             points = part_of(self.x, rest)
             loads[:, rest] += self.problem.exact_flux("flux", points, self.normal[:, rest])
-        free = np.eye(self.problem.form.components)[:, :, None] - projector
+        free = np.eye(c)[:, :, None] - projector
+        sprung = np.flatnonzero(factor.any(axis=(0, 1)))
+        own = np.einsum("cdm,dem->cem", free[..., sprung], factor[..., sprung])
+        factor[..., sprung] = np.einsum("cdm,dem->cem", own, free[..., sprung])
         return np.einsum("cdm,dm->cm", free, loads), factor
 
     def _partly_held(self, projector: Array, named: Array) -> Array:
@@ -303,7 +306,8 @@ class Acting:
     def _refuse_load(self, condition: Condition, point: int) -> None:
         held = [c for i, c in enumerate(self.problem.conditions) if c.is_essential and self.holding(i)[point]]
         is_same = condition.region == held[0].region
-        remedy = "give one of them" if is_same else f"write '{condition.region} and not ({held[0].region})'"
+        region = f"({condition.region})" if " or " in str(condition.region) else str(condition.region)
+        remedy = "give one of them" if is_same else f"write '{region} and not ({held[0].region})'"
         raise ValueError(
             f"{condition.role} acts where {held[0].role} holds the body, as at {self._place(point)}: {remedy}"
         )

@@ -43,8 +43,8 @@ class WeakFace:
     points in space and outward unit normals. weights: (m,), the weights of integrals in space. inverse: (3, 3, m),
     J^-1. codes: (m,), bit i + 1 where condition i holds. projector: (c, c, m), P. values: (c, m), P g. gamma: (m,),
     zero where P is. slowest: (m,), the law's factor over the depth of the cube behind the face, that is gamma without
-    its constants on a single span. factor: (m,), the factor of an exchange. loads: (c, m), the given flux into the
-    body, outside of P. is_whole: (k,), whether some P is given at all points of the face.
+    its constants on a single span. factor: (c, c, m), that of u in an exchange, outside of P. loads: (c, m),
+    the given flux into the body, outside of P. is_whole: (k,), whether some P is given at all points of the face.
 
     tables: (m, k n_b n_c) each, values of the faces' functions and their derivatives in the two directions. slope: the
     derivative across the face of the functions of its layer, minus that of the next layer. layers: the coefficients of
@@ -92,8 +92,22 @@ class WeakFace:
     @cached_property
     def stiff(self) -> Array:
         """Return the weights times the factor (c, c, m) of u . v: gamma P, and the factor of an exchange elsewhere."""
-        free = np.eye(len(self.projector))[:, :, None] - self.projector
-        return self.weights * (self.gamma * self.projector + self.factor * free)
+        return self.weights * (self.gamma * self.projector + self.factor)
+
+    @cached_property
+    def is_sprung(self) -> Mask:
+        """Return the mask (m,) of the points where the flux depends on u."""
+        return np.asarray(self.factor.any(axis=(0, 1)))
+
+    @property
+    def holding(self) -> Array:
+        """Return P plus the factor of an exchange over its largest eigenvalue, (c, c, m): what resists motions."""
+        found = self.projector.copy()
+        sprung = np.flatnonzero(self.is_sprung)
+        if len(sprung):
+            own = self.factor[..., sprung]
+            found[..., sprung] += own / np.linalg.eigvalsh(np.moveaxis(own, -1, 0))[:, -1]
+        return found
 
     @property
     def axis(self) -> int:
@@ -217,7 +231,7 @@ class WeakFace:
         held = self.held[component, component]
         held = np.where(held > ROUNDING * self.weights, held, 0.0)
         loose, fast, slow = self.of_patches(
-            np.stack([(self.weights - held) * self.factor, held * self.gamma, held * self.slowest])
+            np.stack([self.weights * self.factor[component, component], held * self.gamma, held * self.slowest])
         )
         return np.asarray(loose + np.where(self.is_whole, fast, np.sqrt(fast * slow)))
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Collection, Hashable, Iterator, Mapping
+from collections.abc import Collection, Hashable, Iterator, Mapping, Sequence
 from copy import copy
 from typing import Any, ClassVar, Self
 
@@ -14,7 +14,7 @@ from parameterize.spline.body import Body, BodyLike, as_body
 from parameterize.spline.volume import FACE_NAMES
 
 from ..field import FieldOnBody
-from .conditions import Condition, Flux, OnFaces, Robin, Value, listed, on_faces, on_regions
+from .conditions import Condition, Flux, OnFaces, Robin, Value, listed, on_faces, on_regions, shares_out
 from .data import ByPatch, Data, Datum, PerPatch, finite, parse_each
 from .form import Form, check_shapes, strong_form, strong_terms
 from .frame import UnitFrame
@@ -229,6 +229,22 @@ class BoundaryValueProblem:
         faces = tuple(one.on_patch(patch, solid, names) for one, names in won if names)
         other = self.of_patch(patch, solid)._assign(prefix=prefix, faces=faces)
         return other._assign(dirichlet=tuple(filter(other.strong_on, outer)))
+
+    def sharing(self, conditions: Sequence[Condition]) -> Self:
+        """Return the same problem with what its totals come to at each point, as conditions of the whole body say."""
+        pairs = zip(self.conditions, conditions, strict=True)
+        own = tuple(one.sharing(other) if shares_out(one) and shares_out(other) else one for one, other in pairs)
+        return copy(self)._assign(conditions=own)
+
+    @property
+    def has_totals(self) -> bool:
+        """Return whether a condition states something in total."""
+        return any(map(shares_out, self.conditions))
+
+    def nominal(self) -> Self:
+        """Return the same problem, whose totals have some field of their kind where they have none yet."""
+        own = tuple(one.nominal() if shares_out(one) else one for one in self.conditions)
+        return copy(self)._assign(conditions=own)
 
     def _of(self, face: str) -> Condition | None:
         """Return the condition of a whole face; None where regions have the data."""

@@ -15,6 +15,7 @@ from parameterize.arrays import Array
 from .conditions import OF_BODIES, Condition, GivenRegions, OnFaces
 from .data import LARGEST, SMALLEST, Data
 from .form import Quantity
+from .inertia import with_inertia
 from .owners import Owner, entry_of
 from .problem import LawWithData
 
@@ -48,11 +49,22 @@ class Elasticity(LawWithData):
         E > 0. On several patches or solids also a dictionary: a number for each patch, or for the name of each solid.
     poisson_ratio : float
         -1 < nu < 1/2, or a dictionary as `young`. `lame` converts from lambda and mu.
-    conditions : sequence of Fix, Roller, Symmetry, Load, Pressure or Spring, optional
+    conditions : sequence of conditions such as Fix or Load, optional
         Supports and loads on regions of the boundary. Where a region is given, the rest of the boundary is free, or has
         the traction of `exact`; `displacement` and `traction` are left out then.
-    fix, roller, symmetry, load, pressure, spring : dict of region to data, optional
-        Short forms of these: `load={"u1": (0, 0, 1)}`; of supports also regions alone, `fix="u0"`.
+    fix, roller, symmetry, turn, spring, total_spring, foundation : dict of region to data, optional
+        Short forms of the supports of these names, such as `spring={"u0": 50}`; also regions alone, `fix="u0"`.
+    load, pressure, hydrostatic, total_force, moment, remote_force, bearing : dict of region to data, optional
+        Short forms of the loads of these names, such as `total_force={"u1": (0, 0, -500)}`. Data with a point are a
+        pair: `remote_force={"u1": ((0, 0, -500), (10, 0, 50))}`.
+    density : float, optional
+        Mass per volume, by which `gravity`, `acceleration` and `spin` act; or a dictionary as `young`.
+    gravity : three numbers, optional
+        The acceleration of gravity, such as (0, 0, -9810) in mm/s².
+    acceleration : three numbers, optional
+        The acceleration of the body, whose mass resists it: the load is minus the density times it.
+    spin : pair of three numbers each, optional
+        The angular velocity, in radians per time, and a point on the axis: ((0, 0, 314), (0, 0, 0)).
     force : three entries, optional
         The former name of `body_force`.
 
@@ -85,7 +97,19 @@ class Elasticity(LawWithData):
     symmetry: GivenRegions | None = None
     load: GivenRegions | None = None
     pressure: GivenRegions | None = None
+    turn: GivenRegions | None = None
     spring: GivenRegions | None = None
+    total_spring: GivenRegions | None = None
+    foundation: GivenRegions | None = None
+    hydrostatic: GivenRegions | None = None
+    total_force: GivenRegions | None = None
+    moment: GivenRegions | None = None
+    remote_force: GivenRegions | None = None
+    bearing: GivenRegions | None = None
+    density: float | Mapping[Owner, float] | None = None
+    gravity: Sequence[float] | None = None
+    acceleration: Sequence[float] | None = None
+    spin: tuple[Sequence[float], Sequence[float]] | None = None
     force: Data | None = None
 
     components = 3
@@ -106,7 +130,9 @@ class Elasticity(LawWithData):
                 raise ValueError("force is the former name of body_force: give body_force alone")
             self._assign(body_force=self.force, force=None)
         is_loaded = self.displacement is not None or bool(self.traction) or bool(self.conditions)
-        force = NONE if self.body_force is None and self.exact is None and is_loaded else self.body_force
+        mass = self.density, self.gravity, self.acceleration, self.spin
+        force = with_inertia(self.body_force, *mass, has_exact=self.exact is not None)
+        force = NONE if force is None and self.exact is None and is_loaded else force
         self._set({"exact": self.exact, "source": force}, self.displacement, self.traction)
 
     def demand_held(self) -> None:
