@@ -35,8 +35,10 @@ from solve.forms.conditions import *
 
 from .batch.run_batch import run_batch as run_batch
 from .errors import InputError as InputError
+from .errors import TimeLimitError as TimeLimitError
 from .io.formats import export as export
 from .io.formats import load_volume as load_volume
+from .io.solutions import load_solution as load_solution
 from .options import ElasticityOptions as ElasticityOptions
 from .options import MapOptions as MapOptions
 from .options import PoissonOptions as PoissonOptions

@@ -4,6 +4,8 @@ import signal
 import sys
 from types import FrameType
 
+from .signals import is_compiling
+
 PAUSE = 0.1  # seconds after which an interruption is tried again
 
 
@@ -34,12 +36,10 @@ def catch_signals() -> None:
 
 def _interrupt(number: int, frame: FrameType | None) -> None:
     """Interrupt; later, where LLVM has called Python while it compiles a kernel: an error raised there gets lost."""
-    while frame is not None:
-        if hasattr(signal, "setitimer") and frame.f_globals.get("__name__", "").startswith("llvmlite."):
-            signal.signal(signal.SIGALRM, _interrupt)
-            signal.setitimer(signal.ITIMER_REAL, PAUSE)
-            return
-        frame = frame.f_back
+    if hasattr(signal, "setitimer") and is_compiling(frame):
+        signal.signal(signal.SIGALRM, _interrupt)
+        signal.setitimer(signal.ITIMER_REAL, PAUSE)
+        return
     raise KeyboardInterrupt
 
 

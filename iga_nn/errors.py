@@ -19,6 +19,20 @@ class InputError(ValueError):
     """
 
 
+class TimeLimitError(Exception):
+    """Say that the time limit of a run is reached before there is a result, and how to continue.
+
+    Examples
+    --------
+    >>> import iga_nn
+    >>> try:
+    ...     iga_nn.run("poisson", "cube", "out", time_limit="0.001s")
+    ... except iga_nn.TimeLimitError as error:
+    ...     print(error)
+    out: the time limit of 0.001 s is reached before there is a result; nothing was computed yet that could be resumed
+    """
+
+
 @contextmanager
 def input_errors() -> Iterator[None]:
     """Turn ValueError and OSError of the block into InputError; the block must only read or check a user's input."""
@@ -34,7 +48,7 @@ def expected_errors() -> tuple[type[Exception], ...]:
     from solve.diagnostics import ConvergenceError
     from solve.forms.parser import ExpressionError
 
-    return InputError, MeshError, ExpressionError, ConvergenceError, OSError
+    return InputError, TimeLimitError, MeshError, ExpressionError, ConvergenceError, OSError
 
 
 def one_line(error: BaseException) -> str:

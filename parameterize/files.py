@@ -1,6 +1,7 @@
 """Files: atomic writing, guarded reading of .npz without pickles, unpacking of .gz within a limit."""
 
 import gzip
+import hashlib
 import io
 import math
 import os
@@ -18,6 +19,11 @@ from numpy.lib import format as npy
 from numpy.typing import NDArray
 
 MAX_UNPACKED_BYTES = 512 << 20
+
+
+def digest(path: Path) -> str:
+    """Return the SHA-256 of a file; "" where there is none."""
+    return hashlib.sha256(path.read_bytes()).hexdigest() if path.is_file() else ""
 
 
 def save_arrays(path: str | Path, **arrays: NDArray[Any]) -> None:

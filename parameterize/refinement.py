@@ -32,6 +32,7 @@ from .spline.bspline import breakpoints, midpoints
 from .spline.patch_groups import group_of
 from .spline.spline_map import ControlNets, SplineMap, tied_spans
 from .spline.volume import AXES
+from .time_limit import OutOfTime, cut_short, seconds_to_spare
 
 _log = logging.getLogger(__name__)
 _CHECKPOINT = "knots"
@@ -44,7 +45,7 @@ _GAIN = 3e-4  # in place of the spline stage's: the first steps on new knots gai
 ROUNDS = 8  # after a refinement, at most
 POLISH = 3  # of these rounds, while the map is certified, at most
 
-Stop = Literal["tolerance met", "limit reached", "no better map"]
+Stop = Literal["tolerance met", "limit reached", "no better map", "out of time"]
 
 
 @dataclass(frozen=True)
@@ -110,12 +111,19 @@ def refine(
         _log.info("%s", levels[-1])
         if not any(found.faults) and levels[-1].distance <= refinement.tolerance:
             break
+        if seconds_to_spare() <= 0.0:
+            stopped = "out of time"
+            break
         kept = checkpoints.of_part(f"refined{number}")
         finer = _chosen_knots(spots, refinement.max_control_points, narrowest, kept)
         if ControlNets(config.degree, finer).shapes == found.spline.nets.shapes:
             stopped = "limit reached"
             break
-        other, surface, course = _optimized_on(finer, found.spline, fit, config, weights, kept, report)
+        try:
+            other, surface, course = _optimized_on(finer, found.spline, fit, config, weights, kept, report)
+        except OutOfTime:
+            stopped = "out of time"
+            break
         spots = _Spots.of(other, surface, course)
         if (other.faults, spots.level.distance) >= (found.faults, levels[-1].distance):
             stopped, dropped = "no better map", spots.level
@@ -123,6 +131,8 @@ def refine(
             break
         found, fit = other, surface
         levels.append(spots.level)
+    if stopped == "out of time":
+        cut_short("the refinement of the spline")
     told = Refinement(refinement.tolerance, refinement.max_control_points, stopped, tuple(levels), dropped)
     return found, fit, told
 

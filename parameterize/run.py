@@ -27,6 +27,7 @@ from .quality.quality import QualityReport, measure
 from .refinement import Refinement, refine
 from .spline.body import Body, BodyLike
 from .surface.surface import Surface
+from .time_limit import closing
 from .training.backend import choose_device, choose_precision
 from .transfer import transferred
 from .ways.mapping_task import MappingTask
@@ -201,17 +202,18 @@ def parameterize(
         with timed(seconds, "refine"):
             options = config.spline, config.refinement, attempt.weights
             found, fit, refinement = refine(found, fit, *options, checkpoints=checkpoints, **report)
-    with timed(seconds, "optimize"):
-        body, boundary = _in_users_units(found, fit, task)
-        if copy is not surface:
-            boundary = transferred(boundary, body, surface)
-    steps = history.arrays()
-    if when_made is not None:
-        when_made(body.simplest, steps)
-    with timed(seconds, "certify"):
-        certificate = certify(body)  # of the body in the user's units: bringing it there rounds
-        proofs = certificate, check_boundary(body)
-        quality = measure(body, surface.vertices, surface.faces, surface.scale, boundary, *proofs, surface.sharp)
+    with closing():  # a time limit that is reached now does not lose the map
+        with timed(seconds, "optimize"):
+            body, boundary = _in_users_units(found, fit, task)
+            if copy is not surface:
+                boundary = transferred(boundary, body, surface)
+        steps = history.arrays()
+        if when_made is not None:
+            when_made(body.simplest, steps)
+        with timed(seconds, "certify"):
+            certificate = certify(body)  # of the body in the user's units: bringing it there rounds
+            proofs = certificate, check_boundary(body)
+            quality = measure(body, surface.vertices, surface.faces, surface.scale, boundary, *proofs, surface.sharp)
     return Parameterization(
         volume=body.simplest,
         boundary=boundary,

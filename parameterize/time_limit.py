@@ -5,7 +5,7 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 
 class OutOfTime(KeyboardInterrupt):  # noqa: N818 - as KeyboardInterrupt: what catches one keeps a checkpoint
@@ -18,7 +18,7 @@ class TimeLimit:
 
     seconds: all of it. end: when it is over, on the clock of `time.monotonic`. reserve: seconds that later stages need.
     wish: seconds that later stages would use. is_closing: whether the block that runs now writes what is done, and may
-    take longer.
+    take longer. is_told: whether the present stage was interrupted. cut: what ended early for it, in words.
     """
 
     seconds: float
@@ -26,6 +26,13 @@ class TimeLimit:
     reserve: float = 0.0
     wish: float = 0.0
     is_closing: bool = False
+    is_told: bool = False
+    cut: list[str] = field(default_factory=list)
+
+    @property
+    def left(self) -> float:
+        """Return the seconds that the present stage may take."""
+        return self.end - self.reserve - time.monotonic()
 
     def __str__(self) -> str:
         return f"time limit of {self.seconds:g} s"
@@ -42,7 +49,7 @@ def present_limit() -> TimeLimit | None:
 def seconds_left() -> float:
     """Return the seconds that the present stage may take; infinity without a limit."""
     limit = _LIMIT.get()
-    return math.inf if limit is None else limit.end - limit.reserve - time.monotonic()
+    return math.inf if limit is None else limit.left
 
 
 def seconds_to_spare() -> float:
@@ -53,8 +60,17 @@ def seconds_to_spare() -> float:
 
 def check_time() -> None:
     """Raise OutOfTime where the time of the present stage is over; call it between steps, as often as you like."""
-    if seconds_left() <= 0.0:
-        raise OutOfTime(f"{_LIMIT.get()} is reached")
+    limit = _LIMIT.get()
+    if limit is not None and not limit.is_closing and seconds_left() <= 0.0:
+        limit.is_told = True
+        raise OutOfTime(f"{limit} is reached")
+
+
+def cut_short(what: str) -> None:
+    """Note that a stage has ended early for the time limit, for the report."""
+    limit = _LIMIT.get()
+    if limit is not None and what not in limit.cut:
+        limit.cut.append(what)
 
 
 @contextmanager
@@ -75,11 +91,12 @@ def reserving(needed: float, wished: float = 0.0) -> Iterator[None]:
         yield
         return
     before = limit.reserve, limit.wish
-    limit.reserve, limit.wish = needed, wished
+    limit.reserve, limit.wish, limit.is_told = needed, wished, False
     try:
         yield
     finally:
         limit.reserve, limit.wish = before
+        limit.is_told = False
 
 
 @contextmanager

@@ -22,6 +22,7 @@ from parameterize.spline.bspline import gauss_points, greville, open_uniform_kno
 from parameterize.spline.spline_map import ControlNets, SplineMap
 from parameterize.spline.volume import BSplineVolume
 from parameterize.surface.geometry import vertex_quadrics, vertex_weights
+from parameterize.time_limit import limited, reserving
 
 DESCEND = "parameterize.optimization.rounds.descend"
 CONFIG = SplineConfig(control_points=7, steps=5)
@@ -241,3 +242,14 @@ def test_what_was_certified_is_the_result_where_the_polish_folds_more(monkeypatc
     found, course, _ = optimise_from(start, replace(SCHEDULE, rounds=12), fit=fit)
     assert found.certificate.verdict == "certified" and np.array_equal(found.spline.control, start.reshape(3, -1))
     assert course.ending is Reason.FOLDS_AGAIN and course.rounds == {"shape": 1, "polish": 2}
+
+
+def test_a_time_limit_ends_the_rounds_with_the_best_map():
+    start = SplineMap(NETS, wavy_control(0.0).reshape(3, -1))
+    with limited(0.0) as limit:
+        found, course = optimize(start, surface_fit(), CONFIG, SCHEDULE, history=History())
+    assert (course.ending, sum(course.rounds.values())) == (Reason.OUT_OF_TIME, 0) and not any(found.faults)
+    assert limit.cut == ["the rounds of the spline, after 0"]
+    with limited(100.0), reserving(0.0, wished=100.0):  # a map without faults leaves the rest to others
+        _, course = optimize(start, surface_fit(), CONFIG, SCHEDULE, history=History())
+    assert (course.ending, sum(course.rounds.values())) == (Reason.OUT_OF_TIME, 0)

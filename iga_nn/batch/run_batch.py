@@ -11,6 +11,7 @@ from parameterize.files import save_text
 
 from ..errors import InputError, expected_errors, one_line
 from ..options import MapOptions, ProblemOptions, WorkerOptions
+from ..options.texts import duration
 from ..report import document as reports
 from ..rounding import rounded
 from ..type_check import check_type
@@ -53,6 +54,7 @@ def run_batch(
     force: bool = False,
     vector: bool = False,
     progress: Progress | None = None,
+    time_limit: float | str | None = None,
     **given: ProblemOptions | None,
 ) -> Batch:
     """Parameterize many surfaces and solve a problem on each in worker processes; return the table.
@@ -82,6 +84,9 @@ def run_batch(
         Write plots of curves as PDF, too.
     progress : callable, optional
         Called after every change with the batch and the list of its running surfaces.
+    time_limit : float or str, optional
+        Seconds, or a time such as "10min", after which a surface ends with the best result that it has; the same
+        command again goes on.
     **given : PoissonOptions or ElasticityOptions
         Options of the problem that is solved on each, under its name: poisson=PoissonOptions(...).
 
@@ -126,6 +131,8 @@ def run_batch(
     ):
         check_type(name, value, kind)
     pipeline.checked(mapping, problem_options)
+    if time_limit is not None:
+        duration("--time-limit", time_limit)
     if out == "":
         raise InputError("out is empty: name a folder")
     corners = None if mapping.corners is None else Path(mapping.corners).absolute()
@@ -135,7 +142,9 @@ def run_batch(
     if split and mapping.component is not None:
         raise InputError("split takes every component: leave --component out")
     tasks = [
-        Task(entry.name, entry.mesh, entry.folder, replace(common, component=number), problem_options, vector)
+        Task(
+            entry.name, entry.mesh, entry.folder, replace(common, component=number), problem_options, vector, time_limit
+        )
         for entry, number in (
             divided(entries, mapping.max_faces) if split else [(entry, mapping.component) for entry in entries]
         )

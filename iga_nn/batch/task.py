@@ -22,11 +22,13 @@ class Task(Entry):
     """Hold a surface of a batch and all options of its result.
 
     problem_options: the problem to solve, None for the map alone. vector: whether curves are also written as PDF.
+    time_limit: of this surface, as the command line takes it.
     """
 
     mapping: MapOptions
     problem_options: ProblemOptions | None
     vector: bool = False
+    time_limit: float | str | None = None
 
 
 Work = Callable[[Task, int, str], Ended]
@@ -51,6 +53,7 @@ def compute(task: Task, number: int, batch: str) -> Ended:
             "mapping": task.mapping,
             "problem_options": task.problem_options,
             "vector": task.vector,
+            "time_limit": task.time_limit,
         }
         return pipeline.parameterize_to(task.mesh, task.folder, progress=progress, **given)
 

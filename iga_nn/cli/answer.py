@@ -46,6 +46,8 @@ def verdict_in_words(outcome: Outcome) -> str:
         lines.append(f"accuracy         {reports.accuracy_in_words(refined)}")
     lines += [f"NOT THE PART     {far}"] if far else []
     lines += [f"NOT SOLVED       {unsolved}"] if unsolved else []
+    if cut := outcome.report.get("incomplete"):
+        lines.append(f"CUT SHORT        {cut}; --resume goes on")
     measured = verdict.get("arap", {})
     if "patches" in outcome.report["parameterization"]:  # each against its own box: the unit changes nothing
         measured = {"own boxes": measured["as_given"]} if measured else {}

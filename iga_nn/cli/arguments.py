@@ -95,18 +95,21 @@ class OutputOptions:
         force: replace a finished result in that folder.
         vector: also write plots of curves (loss history, errors over the mesh size) as PDF.
         quiet: show no progress.
+        time_limit: time such as 90s, 10min or 1h, after which a run ends with the best result it has; in a batch it is
+            that of each surface, and --resume continues.
     """
 
     out: str | None = None
     force: bool = False
     vector: bool = False
     quiet: bool = False
+    time_limit: str | None = None
     as_json: Json = False
 
     @property
     def folder(self) -> dict[str, Any]:
         """Return the keywords of the pipeline."""
-        return {"out": self.out, "force": self.force, "vector": self.vector}
+        return {name: getattr(self, name) for name in ("out", "force", "vector", "time_limit")}
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import App, CycloptsError, Parameter
 
-from ..errors import InputError, expected_errors, input_errors
+from ..errors import InputError, TimeLimitError, expected_errors, input_errors
 from ..options import (
     PROBLEMS,
     MapOptions,
@@ -25,7 +25,7 @@ from ..options import (
     WorkerOptions,
 )
 from ..version import __version__
-from . import BAD_INPUT, DONE, INTERRUPTED, NOT_SOLVED
+from . import BAD_INPUT, DONE, INTERRUPTED, NOT_CERTIFIED, NOT_SOLVED
 from .arguments import (
     OF_STUDY,
     Json,
@@ -144,6 +144,7 @@ def solve_problem(
     *,
     device: Literal["cpu", "cuda"] = "cpu",
     mpi: Mpi = False,
+    resume: bool = False,
     output: OutputOptions = OutputOptions(),
     problem_options: ProblemOptions = PoissonOptions(),
 ) -> int:
@@ -153,13 +154,15 @@ def solve_problem(
     option names them.
 
     Args:
+        resume: go on after the levels that an interrupted solve in the output folder has done.
         device: where the linear system is solved; cuda takes symmetric laws that are scalar, or constant as elasticity.
     """
     from ..workflow import mpi_job, pipeline
 
     with shown_progress(output.quiet):
         comm = mpi_job.all_processes() if mpi else None
-        outcome = pipeline.solve_to(volume, problem_options=problem_options, device=device, comm=comm, **output.folder)
+        how: dict[str, Any] = {"device": device, "comm": comm, "resume": resume}
+        outcome = pipeline.solve_to(volume, problem_options=problem_options, **how, **output.folder)
     return DONE if outcome is None else _tell(outcome, output)
 
 
@@ -396,7 +399,8 @@ def main(argv: list[str]) -> int:
         from solve import ConvergenceError
 
         print(f"iga-nn: {refusal(error, argv)}", file=sys.stderr)
-        return NOT_SOLVED if isinstance(error, ConvergenceError) else BAD_INPUT
+        codes = {ConvergenceError: NOT_SOLVED, TimeLimitError: NOT_CERTIFIED}
+        return codes.get(type(error), BAD_INPUT)
     return code if isinstance(code, int) else DONE  # a command that only writes a file returns nothing
 
 

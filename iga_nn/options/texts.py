@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
@@ -14,6 +15,8 @@ if TYPE_CHECKING:
 SMALLEST_SHARE = 1e-8  # what the linear solver leaves is 1e-10
 _EQUALS = re.compile("(?<![<>=])=(?!=)")
 _OWNER = re.compile(r"""(?:^|,)\s*("[^"]*"|'[^']*'|[^,:"']*[^,:"'\s])\s*:""")
+_DURATION = re.compile(r"(\d+\.?\d*|\.\d+)\s*(s|min|h)?")
+_SECONDS = {"s": 1.0, "min": 60.0, "h": 3600.0}
 _PATCH = re.compile(r"p(\d+)")
 _AT_POINT = re.compile(r"(.*)\sat\s*\((.*)\)\s*")
 _OF_REGION = re.compile("\"[^\"]*\"|'[^']*'|plane\\s+[xyz]\\s*=")  # quoted text, and planes of a solid model
@@ -119,6 +122,16 @@ def number(flag: str, text: str) -> float:
         return float(text)
     except ValueError:
         raise InputError(f"{flag} {text!r:.80}: give a number, or one a solid, such as 'steel: 1, pad: 2'") from None
+
+
+def duration(flag: str, given: str | float) -> float:
+    """Return the seconds of a number, or of a text such as 90s, 10min or 1.5h. Raises InputError for any other."""
+    text = str(given).strip()
+    found = _DURATION.fullmatch(text)
+    seconds = float(found[1]) * _SECONDS[found[2] or "s"] if found else 0.0
+    if not 0.0 < seconds < math.inf:
+        raise InputError(f"{flag} {text!r:.80}: give a time such as 90s, 10min or 1h")
+    return seconds
 
 
 def share(flag: str, given: str | float) -> float:

@@ -78,8 +78,8 @@ def read(folder: Path) -> Report | None:
 
 
 def is_finished(report: Report | None) -> bool:
-    """Return whether the run that wrote this report has ended."""
-    return report is not None and "total" in (report.get("seconds") or {})
+    """Return whether the run that wrote this report has ended, and was not cut short by a time limit."""
+    return report is not None and "total" in (report.get("seconds") or {}) and "incomplete" not in report
 
 
 def is_certified(report: Report) -> bool:
@@ -180,7 +180,8 @@ def state(report: Report) -> Literal["certified", "not the part", "not certified
         return "not the part"
     if not is_certified(report):
         return "not certified"
-    return "certified" if is_converged(report) and is_meaningful(report) else "not solved"
+    is_missing = "incomplete" in report and "not_solved" in report and not solved(report)
+    return "certified" if is_converged(report) and is_meaningful(report) and not is_missing else "not solved"
 
 
 def not_the_part(report: Report) -> str:
@@ -271,7 +272,7 @@ def verdict(report: Report, folder: Path) -> Report:
     quality = report["parameterization"]
     short: Report = {"folder": str(folder)}
     short |= {"not_the_part": quality["not_the_part"]} if quality.get("not_the_part") else {}
-    short |= {"not_solved": report["not_solved"]} if "not_solved" in report else {}
+    short |= {name: report[name] for name in ("not_solved", "incomplete") if name in report}
     short["bijective"] = quality["bijective"]
     short |= {"orientation": quality["orientation"]} if "orientation" in quality else {}
     short |= {"boundary_injective": quality.get("boundary_injective"), "one_to_one": one_to_one(report)}

@@ -127,6 +127,8 @@ def verdicts(report: Report) -> list[tuple[str, str, str]]:
     if "not_solved" in report:
         what = "A level was not solved" if reports.solved(report) else "The problem was not solved"
         found.append(("bad", what, report["not_solved"]))
+    if "incomplete" in report:
+        found.append(("unsure", "The run was cut short", f"{report['incomplete']}; --resume goes on."))
     if not reports.is_meaningful(report):
         found.append(("bad", "The errors mean nothing", "The notices below say why."))
     if not reports.is_converged(report):

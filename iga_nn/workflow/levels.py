@@ -7,7 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from parameterize.checkpoint import Checkpoints
-from parameterize.spline.body import BodyLike, as_body
+from parameterize.files import digest
+from parameterize.spline.body import BodyLike
 from solve import Answer, Grading, SolveReport
 from solve.discretization.error_norms import Errors
 from solve.field import BodyField
@@ -15,14 +16,12 @@ from solve.forms.boundary_value_problem import BoundaryValueProblem
 from solve.reactions import Balance
 from solve.solution import Solution
 
-from ..figures.fields import problems_on
+from ..io.solutions import SOLUTION, VOLUME, solution_on
 from ..options import UNITS, ProblemOptions
 from ..report import document as reports
-from .output_folder import digest
 
 log = logging.getLogger(__name__)
 
-SOLUTION = "solution.npz"
 _CHECKPOINT = "solve"
 
 
@@ -86,7 +85,7 @@ class KeptLevels:
         """Keep the levels whose finest solution the output folder holds."""
         state = {"asked": self._asked, "refine": done.refine, "entries": reports.plain(done.entries)}
         state |= {"reports": [reports.plain(asdict(report)) for report in done.reports]}
-        state |= {"solution": digest(self.folder / SOLUTION)}
+        state |= {"solution": digest(self.folder / SOLUTION), "volume": digest(self.folder / VOLUME)}
         state |= {"grading": None if done.grading is None else done.grading.as_dict}
         self.checkpoints.save(_CHECKPOINT, {}, state)
 
@@ -105,11 +104,14 @@ class KeptLevels:
         if state["asked"] != self._asked or refine != [*levels, *levels * len(refine) * is_graded][: len(refine)]:
             log.info("the levels that are done are those of another problem: all are solved anew")
             return Levels()
+        if state["volume"] != digest(self.folder / VOLUME):
+            log.info("the map has changed since: all levels are solved anew")
+            return Levels()
         if state["solution"] != digest(self.folder / SOLUTION):
             log.info("%s is not the solution of the last level: all are solved anew", self.folder / SOLUTION)
             return Levels()
         found = [_report(values) for values in state["reports"]]
-        finest = _loaded(self.folder / SOLUTION, body, found[-1], problem)
+        finest = solution_on(BodyField.load(self.folder / SOLUTION), body, problem, found[-1])
         grading = Grading.from_dict(body, state["grading"]) if is_graded else None
         done = Levels(refine, state["entries"], found, finest, grading)
         log.info("%s: solved before the interruption", done.in_words)
@@ -129,10 +131,3 @@ def _report(values: dict[str, Any]) -> SolveReport:
         given["balance"] = Balance(**balance | {"load": tuple(balance["load"]), "reactions": reactions})
     given["asked"] = tuple(Answer(**entry | {"at": entry["at"] and tuple(entry["at"])}) for entry in values["asked"])
     return SolveReport(**given)
-
-
-def _loaded(path: Path, body: BodyLike, report: SolveReport, problem: BoundaryValueProblem) -> Solution:
-    """Return the solution of a file on its body."""
-    glued = as_body(body)
-    field = BodyField(BodyField.load(path).patches, glued)
-    return Solution.of(field, problems_on(problem, glued), report, problem.on(glued))

@@ -15,13 +15,14 @@ import numpy as np
 from parameterize.arrays import Array, IntArray
 from parameterize.checkpoint import CheckpointError, Checkpoints, differing
 from parameterize.compilation import compilation_told
-from parameterize.files import array_names, load_arrays, save_arrays
+from parameterize.files import array_names, digest, load_arrays, save_arrays
 from parameterize.progress import ProgressCallback
 from parameterize.spline.body import BodyLike, as_body
 from parameterize.spline.solids import PatchSolids
 from parameterize.spline.volume import FACE_NAMES
 from parameterize.surface.geometry import vertex_normals
 from parameterize.surface.surface import Surface
+from parameterize.time_limit import closing
 from solve import ExpressionError
 from solve.diagnostics import empty_formulas
 from solve.forms.boundary_value_problem import BoundaryValueProblem
@@ -37,8 +38,9 @@ from ..report.advice import unproved_places, with_unproved
 from ..report.artifacts import SOLVED
 from ..rounding import rounded
 from .cost_estimate import Forecast, forecast, warn_of_memory
-from .output_folder import CHECKPOINT, RunFolder, changed_file, digest, has_checkpoint
+from .output_folder import CHECKPOINT, RunFolder, changed_file, has_checkpoint
 from .regions import check_regions, frame_of
+from .time_limit import checked, for_later, stopped_in_words
 from .verdict import tell
 
 if TYPE_CHECKING:
@@ -47,6 +49,7 @@ if TYPE_CHECKING:
 log = logging.getLogger(__name__)
 
 _OF_MAP = ("volume.npz", "boundary.npz", "history.npz")
+_OF_THE_END = ("not_solved", "incomplete", "cut_map", "not_drawn")  # entries of a report that a run takes up again
 _TRIED = 50  # points of the surface
 _CORNERS_BYTES = 65_536
 _LARGEST_COORDINATE = 1e100  # distances of larger ones overflow
@@ -116,10 +119,12 @@ def map_surface(
 
     with compilation_told():
         expected = _prepare(state, given, mapping, problem, unknowns)
-        result = _train(given, mapping, progress, made, state.folder / CHECKPOINT)
-    state.seconds.update(result.seconds)
-    _write(state, given, expected, result, mapping)
-    _draw_defects(state, result)
+        with for_later(is_solved=problem is not None):
+            result = _train(given, mapping, checked(progress), made, state.folder / CHECKPOINT)
+    with closing():
+        state.seconds.update(result.seconds)
+        _write(state, given, expected, result, mapping)
+        _draw_defects(state, result)
     return result
 
 
@@ -139,7 +144,7 @@ def kept_map(
         return None
     if problem is not None:
         _check_data(problem, given.surface)
-    state.report = {name: value for name, value in report.items() if name not in (*SOLVED, "not_solved", "not_drawn")}
+    state.report = {name: value for name, value in report.items() if name not in (*SOLVED, *_OF_THE_END)}
     state.seconds.update(state.report.pop("seconds"))
     state.sweep()
     state.write(**known)
@@ -151,8 +156,11 @@ def kept_map(
 
 
 def _is_of_map(report: reports.Report, given: MapInput) -> bool:
-    """Return whether a report tells of a finished map with this identity that is certified."""
-    if "parameterization" not in report or not reports.is_certified(report):
+    """Return whether a report tells of a finished map with this identity that is certified.
+
+    One that a time limit has cut short is none: its rounds go on.
+    """
+    if "parameterization" not in report or not reports.is_certified(report) or "cut_map" in report:
         return False
     found = {name: report.get("identity", {}).get(name) for name in given.identity}
     return not differing(reports.plain(given.identity), found)
@@ -353,6 +361,7 @@ def _write(
         seed=mapping.seed,
         device=result.device,
         versions=reports.versions(),
+        **({"cut_map": said} if (said := stopped_in_words()) else {}),
         parameterization=with_unproved(result.quality.as_dict(), as_body(result.volume), result.certificate)
         | {"origin": result.origin, "decomposition": result.decomposition, "division": result.decomposition}
         | {"attempts": [asdict(attempt) for attempt in result.attempts]}

@@ -1,6 +1,5 @@
 """Holds one output folder for one run: its report so far, and the clock."""
 
-import hashlib
 import os
 import shutil
 import time
@@ -12,14 +11,16 @@ from tempfile import TemporaryFile
 from typing import Any, get_args
 
 from parameterize.checkpoint import KEPT
-from parameterize.files import unfinished
+from parameterize.files import digest, unfinished
 from parameterize.progress import timed
+from parameterize.time_limit import OutOfTime, present_limit
 
-from ..errors import InputError
+from ..errors import InputError, TimeLimitError
 from ..report import document as reports
 from ..report.artifacts import REPORT, Part, files_of
 from .drawing import Failures, Figures, draw, drawing
 from .painter import Painter
+from .time_limit import stopped_in_words
 
 CHECKPOINT = "checkpoint"
 
@@ -120,11 +121,16 @@ class RunFolder:
         reports.write(self.folder, self.report | {"seconds": self.seconds})
 
     def finish(self) -> Outcome:
-        """Write the total time, which marks the result as finished, and remove the checkpoint."""
+        """Write the total time, which marks the result as finished, and remove the checkpoint.
+
+        A result that a time limit has cut short is none that is finished, and keeps its checkpoint.
+        """
+        if said := stopped_in_words():
+            self.report["incomplete"] = said
         self.wait_for_figures()
         self.seconds["total"] = time.perf_counter() - self.started
         self.write(seconds=self.seconds)
-        if "config" in self.report:  # of a training here
+        if "incomplete" not in self.report:
             shutil.rmtree(self.folder / CHECKPOINT, ignore_errors=True)
         return Outcome(self.folder, reports.plain(self.report))
 
@@ -162,6 +168,9 @@ def open_folder(
                     TemporaryFile(dir=folder).close()
             guarded = not force and not has_checkpoint(folder) and reports.read(folder) is None
             yield RunFolder(folder, vector, finished, guarded)
+    except OutOfTime:
+        said = f"{folder}: the {present_limit() or 'time limit'} is reached before there is a result"
+        raise TimeLimitError(f"{said}; {_way_on(folder)}") from None
     except KeyboardInterrupt:
         raise KeyboardInterrupt(f"interrupted; {_way_on(folder)}") from None
 
@@ -247,11 +256,6 @@ def _last_kept(folder: Path) -> str:
     return KEPT.get(last.name.split(".")[0].split("-")[0], "the checkpoint")
 
 
-def digest(path: Path) -> str:
-    """Return the SHA-256 of a file; "" where there is none."""
-    return hashlib.sha256(path.read_bytes()).hexdigest() if path.is_file() else ""
-
-
 def changed_file(folder: Path, report: reports.Report, names: Sequence[str]) -> str:
     """Return the first of some files that is not there, or has changed since the report was written; "" for none.
 
@@ -275,6 +279,8 @@ def _way_on(folder: Path) -> str:
         is_mapped = "parameterization" in report and not reports.solved(report)
         last = "the map" if is_mapped else _last_kept(folder)
         return f"the same command with --resume continues from {last}, and does again what came after"
+    if "study" in report:
+        return f"the solves that are done are in {folder / 'study.csv'}"
     if levels := reports.solved(report).get("levels"):
         return f"{len(levels)} level{'s' * (len(levels) > 1)} done, in {folder / REPORT}"
     if (folder / "volume.npz").exists():

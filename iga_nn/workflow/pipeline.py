@@ -15,11 +15,12 @@ from typing import Any
 import numpy as np
 
 from parameterize.checkpoint import Checkpoints, differing
-from parameterize.files import save_text
+from parameterize.files import digest, save_text
 from parameterize.progress import ProgressCallback
 from parameterize.spline.body import BodyLike, as_body
 from parameterize.spline.volume import BSplineVolume
 from parameterize.threads import default_threads
+from parameterize.time_limit import OutOfTime, closing
 from solve import ConvergenceRow, Solution, SolveOptions, check_device, check_problem, convergence, modes
 from solve.asked.functional import functional
 from solve.discretization.processes import agreed
@@ -46,8 +47,16 @@ from ..type_check import check_type
 from .command_line import command_line
 from .cost_estimate import tell_memory
 from .levels import KeptLevels
-from .mapping import MapInput, kept_map, map_surface, read_input
-from .output_folder import CHECKPOINT, Outcome, RunFolder, changed_file, default_folder, open_folder
+from .mapping import kept_map, map_surface, read_input
+from .output_folder import (
+    CHECKPOINT,
+    Outcome,
+    RunFolder,
+    changed_file,
+    default_folder,
+    has_checkpoint,
+    open_folder,
+)
 from .painter import Painter
 from .regions import check_asks
 from .solving import (
@@ -60,6 +69,7 @@ from .solving import (
     solve_levels,
     verdict_of,
 )
+from .time_limit import clock
 from .verdict import stays_unsolved, write_certificate
 
 log = logging.getLogger(__name__)
@@ -74,6 +84,7 @@ def run(
     force: bool = False,
     vector: bool = False,
     progress: ProgressCallback | None = None,
+    time_limit: float | str | None = None,
     **given: ProblemOptions | None,
 ) -> Outcome:
     """Parameterize a surface, solve a problem on the volume and return the output folder with its report.
@@ -94,6 +105,9 @@ def run(
         Write plots of curves as PDF, too.
     progress : callable, optional
         Called with a `Progress` at every step.
+    time_limit : float or str, optional
+        Seconds, or a time such as "10min", after which the run ends with the best result that it has; its report says
+        what is `incomplete`, and a run with `mapping.resume` goes on.
     **given : PoissonOptions or ElasticityOptions
         Options of the problem, under its name: poisson=PoissonOptions(...).
 
@@ -110,6 +124,8 @@ def run(
         For a formula that is refused.
     InputError
         For other options, and for an output folder that holds a result (unless `force`) or cannot be written.
+    TimeLimitError
+        Where the time limit is reached before there is a map.
 
     Examples
     --------
@@ -119,7 +135,7 @@ def run(
     >>> [level["dofs"] for level in outcome.report["poisson"]["levels"]], (outcome.folder / "report.html").exists()
     ([216], True)
     """
-    how: dict[str, Any] = {"force": force, "vector": vector, "progress": progress}
+    how: dict[str, Any] = {"force": force, "vector": vector, "progress": progress, "time_limit": time_limit}
     return parameterize_to(mesh, out, mapping=mapping, problem_options=chosen(problem, given), **how)
 
 
@@ -145,6 +161,7 @@ def parameterize_to(
     vector: bool = False,
     progress: ProgressCallback | None = None,
     paints_beside: bool = False,
+    time_limit: float | str | None = None,
 ) -> Outcome:
     """Parameterize a surface and, where a problem is given, solve it on the volume, as `run` does.
 
@@ -156,12 +173,16 @@ def parameterize_to(
     check_type("out", out, str | Path | None)
     check_type("progress", progress, Callable | None)
     problem, unknowns = (None, 0) if problem_options is None else checked(mapping, problem_options)
-    with open_folder(mesh, out, force, mapping.resume, vector) as state, ExitStack() as stack:
+    with (
+        clock(time_limit),
+        open_folder(mesh, out, force, mapping.resume, vector) as state,
+        ExitStack() as stack,
+    ):
         if paints_beside and not state.finished and default_threads() > 1:
             state.painter = stack.enter_context(Painter())
         with state.timed("load"):
             given = read_input(mesh, mapping, state.finished.report if state.finished else None)
-        identity = _identity(given, problem_options)
+        identity = _identity(given.identity, problem_options)
         if state.finished:
             return _finished_by(identity, state.finished, vector, problem_options)
         known = {"command": _command(mesh, out, mapping, problem_options), "identity": identity}
@@ -180,7 +201,24 @@ def parameterize_to(
         kept = KeptLevels(
             state.folder, Checkpoints(state.folder / CHECKPOINT, given.identity, resume=True), problem_options
         )
+        return _solved(state, body, problem, problem_options, options, kept)
+
+
+def _solved(
+    state: RunFolder,
+    body: BodyLike,
+    problem: BoundaryValueProblem,
+    problem_options: ProblemOptions,
+    options: SolveOptions,
+    kept: KeptLevels | None,
+) -> Outcome:
+    """Solve the levels, and finish the report; where a time limit ends the first one, with the map alone."""
+    try:
         solution = solve_levels(state, body, problem, problem_options, options, kept)
+    except OutOfTime:
+        with closing():
+            return _finish(state, body)
+    with closing():
         return _finish(state, body, solution, problem, problem_options.units)
 
 
@@ -193,10 +231,10 @@ def _command(
     return command_line(f"run {problem_options.section}", mesh, mapping, problem_options, out=out)
 
 
-def _identity(given: MapInput, problem_options: ProblemOptions | None) -> dict[str, Any]:
+def _identity(of_map: dict[str, Any], problem_options: ProblemOptions | None) -> dict[str, Any]:
     """Return the identity of a run, as plain JSON values: that of its map, and the options of its problem."""
     return reports.plain(
-        given.identity | ({} if problem_options is None else {problem_options.section: problem_options.values()})
+        of_map | ({} if problem_options is None else {problem_options.section: problem_options.values()})
     )
 
 
@@ -222,7 +260,7 @@ def finished_run(
     report = reports.read(Path(out))
     if report is None or not reports.is_finished(report):
         return None
-    identity = _identity(read_input(mesh, mapping, report), problem_options)
+    identity = _identity(read_input(mesh, mapping, report).identity, problem_options)
     return _finished_by(identity, Outcome(Path(out), report), vector, problem_options)
 
 
@@ -235,8 +273,12 @@ def solve_to(
     vector: bool = False,
     device: str = "cpu",
     comm: Any = None,
+    resume: bool = False,
+    time_limit: float | str | None = None,
 ) -> Outcome | None:
     """Solve a problem on a saved volume and return the output folder with its report.
+
+    resume: go on after the levels that an interrupted solve in the same folder has done.
 
     device: the device for the linear system, "cpu" or "cuda"; torch is not needed on the CPU. comm: a
     communicator of mpi4py whose processes all call this function and share the solve; the first process writes the
@@ -248,6 +290,8 @@ def solve_to(
         raise InputError(f"device {device!r}: --mpi runs on the CPU; leave one of them out")
     if comm is not None and problem_options.wanted is not None:
         raise InputError("--accuracy refines in one process: leave --mpi out")
+    if comm is not None and (resume or time_limit is not None):
+        raise InputError("--resume and --time-limit are for solves in one process: leave --mpi out")
     problem, options = with_part(problem_options.problem(), problem_options.solve_options(), path)
     loaded, options = load_volume(path), replace(options, device=device, comm=comm)
     processes = 1 if comm is None else comm.size
@@ -262,13 +306,23 @@ def solve_to(
     tell_memory(loaded, problem, options)
     how: dict[str, Any] = {"device": device} if device != "cpu" else {"mpi": True} if comm is not None else {}
     command = command_line(f"solve {problem_options.section}", path, problem_options, **how, out=out)
+    kept = None
     with ExitStack() as stack:
+        stack.enter_context(clock(time_limit))
         with agreed(comm) if comm is not None else nullcontext():  # no process waits for one whose folder is refused
             state = None
             if comm is None or comm.rank == 0:
-                state = stack.enter_context(open_folder(path, out, force, vector=vector))
-                state.begin("solution")
-                write_certificate(state, path, loaded, command)
+                state = stack.enter_context(open_folder(path, out, force, resume, vector))
+                identity = {"volume": digest(path), "surface": digest(path.with_name("boundary.npz"))}
+                if state.finished:
+                    return _finished_by(_identity(identity, problem_options), state.finished, vector, problem_options)
+                if not (resume and has_checkpoint(state.folder)):
+                    state.begin("solution")
+                checkpoints = Checkpoints(state.folder / CHECKPOINT, identity, resume=resume)
+                with input_errors():
+                    checkpoints.check()
+                kept = None if comm is not None else KeptLevels(state.folder, checkpoints, problem_options)
+                write_certificate(state, path, loaded, command, _identity(identity, problem_options))
         unsolved = state is not None and stays_unsolved(state, problem_options.solve_anyway)
         unsolved = unsolved if comm is None else comm.bcast(unsolved)
         if unsolved:
@@ -276,8 +330,7 @@ def solve_to(
         if state is None:
             deque(each_level(loaded, problem, problem_options, problem_options.levels, options), maxlen=0)
             return None
-        solution = solve_levels(state, loaded, problem, problem_options, options)
-        return _finish(state, loaded, solution, problem, problem_options.units)
+        return _solved(state, loaded, problem, problem_options, options, kept)
 
 
 def with_part(
@@ -308,6 +361,7 @@ def study_to(
     study_options: StudyOptions | None = None,
     force: bool = False,
     vector: bool = False,
+    time_limit: float | str | None = None,
 ) -> tuple[Outcome, str]:
     """Make a convergence study on a saved volume; return the output folder with its report, and the table.
 
@@ -332,7 +386,8 @@ def study_to(
         check_size(loaded, levels[-1], degree, problem.form.components)
     with input_errors():
         check_problem(loaded, problem)
-    with open_folder(path, f"{default_folder(path)}-study" if out is None else out, force, vector=vector) as state:
+    folder = f"{default_folder(path)}-study" if out is None else out
+    with clock(time_limit), open_folder(path, folder, force, vector=vector) as state:
         state.begin("study")
         command = "study" if isinstance(problem_options, PoissonOptions) else f"study {problem_options.section}"
         write_certificate(state, path, loaded, command_line(command, path, problem_options, study_options, out=out))
@@ -375,6 +430,7 @@ def modes_to(
     modes_options: ModesOptions | None = None,
     force: bool = False,
     vector: bool = False,
+    time_limit: float | str | None = None,
 ) -> tuple[Outcome, str]:
     """Find the lowest vibrations of a saved volume; return the output folder with its report, and their table.
 
@@ -385,7 +441,8 @@ def modes_to(
     body, _ = with_part(modes_options.problem(), SolveOptions(), path)
     asks, loaded = modes_options.asks(), load_volume(path)
     check_size(loaded, modes_options.refine, modes_options.degree, body.form.components)
-    with open_folder(path, f"{default_folder(path)}-modes" if out is None else out, force, vector=vector) as state:
+    folder = f"{default_folder(path)}-modes" if out is None else out
+    with clock(time_limit), open_folder(path, folder, force, vector=vector) as state:
         state.begin("modes")
         write_certificate(state, path, loaded, command_line("modes", path, modes_options, out=out))
         if stays_unsolved(state, modes_options.solve_anyway):
@@ -428,11 +485,12 @@ def _finished_by(
         why = ", whose report has no identity" if known is None else f" (different: {', '.join(names)})"
         remedy = "--force replaces it, --out names another folder"
         raise InputError(f"{folder}: holds the result of `{made_by}`{why}; {remedy}")
-    wanted = ["volume.npz", "boundary.npz"] + ["solution.npz"] * bool(reports.solved(finished.report))
+    is_map = "config" in finished.report  # of a training here
+    wanted = ["volume.npz", "boundary.npz"] * is_map + ["solution.npz"] * bool(reports.solved(finished.report))
     if name := changed_file(folder, finished.report, wanted):
         what = "has changed since" if (folder / name).exists() else "is gone from"
         raise InputError(f"{folder}: {name} {what} this finished result; --force makes it anew")
-    if vector and not (folder / "history.pdf").is_file():
+    if vector and is_map and not (folder / "history.pdf").is_file():
         raise InputError(f"{folder}: is finished, without PDFs; leave --vector out, or make it anew with --force")
     log.info("%s: finished already", folder)
     return finished

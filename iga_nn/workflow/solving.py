@@ -11,19 +11,22 @@ import numpy as np
 
 from parameterize.checkpoint import Checkpoints
 from parameterize.spline.body import BodyLike, as_body
-from solve import ConvergenceError, ConvergenceRow, Modes, Solution, SolveOptions, SolveReport, rates
+from parameterize.time_limit import OutOfTime, closing, cut_short
+from solve import ConvergenceRow, Modes, Solution, SolveOptions, SolveReport, rates
 from solve.forms.boundary_value_problem import BoundaryValueProblem
 from solve.forms.frame import UnitFrame
 
-from ..errors import InputError, input_errors, one_line
+from ..errors import InputError, expected_errors, input_errors, one_line
 from ..figures.fields import NAMED
-from ..options import NO_UNITS, ProblemOptions, Units
+from ..io.solutions import SOLUTION
+from ..options import NO_UNITS, ProblemOptions, Units, check_size
 from ..report import document as reports
 from ..report import html
 from ..report.extremes import peak_notices
-from .levels import SOLUTION, KeptLevels, Levels
+from .levels import KeptLevels, Levels
 from .output_folder import RunFolder
 from .refining import each_step, stopped_notice
+from .time_limit import demand_time, for_page
 
 log = logging.getLogger(__name__)
 
@@ -39,7 +42,8 @@ def solve_levels(
     """Solve level after level, write the report of all levels, and return the finest solution.
 
     Each level is in report.json, and its solution in solution.npz, as soon as it is done. Where a later one is
-    interrupted or fails, the page, the figures and solution.vtu are those of the finest that is done. kept: the levels
+    interrupted or fails, the page, the figures and solution.vtu are those of the finest that is done. A time limit ends
+    the levels with what is done; it raises OutOfTime only if nothing is. kept: the levels
     of an interrupted run, and the place for those of this one; None where no run can go on from them.
     """
     options = replace(options, certified=verdict_of(state))
@@ -52,18 +56,31 @@ def solve_levels(
     def show() -> tuple[Any, ...]:
         return _show(state, body, done, problem, problem_options) if done.refine else ()
 
-    with reported(state, body, lambda: done.missing(problem_options.refine), show), state.timed("solve"):
-        for level, more, solution in _each(body, problem, problem_options, options, done, kept):
-            entry = more | level_of(solution)
-            solution.save(state.folder / SOLUTION)
-            done.add(level, entry, solution)
-            state.write(**{problem_options.section: section_of(problem_options, problem, body, done)})
-            if kept and is_finite(solution):
-                kept.save(done)
+    def missing() -> str:
+        return done.missing(problem_options.refine)
+
+    with reported(state, body, missing, show), state.timed("solve"):
+        try:
+            with for_page(body):
+                for level, more, solution in _each(body, problem, problem_options, options, done, kept):
+                    entry = more | level_of(solution)
+                    with closing():
+                        solution.save(state.folder / SOLUTION)
+                        done.add(level, entry, solution)
+                        state.write(**{problem_options.section: section_of(problem_options, problem, body, done)})
+                        if kept and is_finite(solution):
+                            kept.save(done)
+        except OutOfTime as error:
+            cut_short("the levels of the solve")
+            if not done.refine:
+                raise
+            state.write(not_solved=f"{one_line(error) or 'the time limit is reached'}; {missing()}")
+            log.warning("%s", state.report["not_solved"])
         state.write(**{problem_options.section: section_of(problem_options, problem, body, done)})
     for notice in _peaks(problem_options, problem, done):
         log.warning("%s", notice)
-    _show(state, body, done, problem, problem_options)
+    with closing():
+        _show(state, body, done, problem, problem_options)
     assert done.finest is not None  # there is one level at least
     return done.finest
 
@@ -150,7 +167,11 @@ def each_level(
 
     checkpoints: for the load steps of each level. All processes of an MPI job call this together.
     """
+    began, unknowns, processes = 0.0, 0, 1 if options.comm is None else options.comm.size
     for level in sorted(levels):
+        count = check_size(body, level, options.degree, problem.form.components, processes)
+        demand_time(level, (time.monotonic() - began) * count / unknowns if unknowns else 0.0)
+        began, unknowns = time.monotonic(), count
         steps = Checkpoints.none() if checkpoints is None else checkpoints.of_part(f"level{level}")
         try:
             with input_errors():
@@ -179,10 +200,12 @@ def reported(
     """
     try:
         yield
-    except (InputError, ConvergenceError, KeyboardInterrupt) as error:
-        if isinstance(error, KeyboardInterrupt):
+    except (Exception, KeyboardInterrupt) as error:
+        if isinstance(error, KeyboardInterrupt) and not isinstance(error, OutOfTime):
             log.warning("interrupted: what is done is written; interrupt again to stop at once")
         said = one_line(error) or "interrupted"
+        if not isinstance(error, (*expected_errors(), KeyboardInterrupt)):
+            said = f"internal error, {type(error).__name__}: {said}"
         state.write(not_solved=f"{said}; {rest}" if (rest := missing()) else said)
         scene = scene_of(state, body, *show())
         state.wait_for_figures()

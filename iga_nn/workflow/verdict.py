@@ -8,13 +8,14 @@ from parameterize.arrays import in_brackets
 from parameterize.certificate.boundary import check_boundary
 from parameterize.certificate.certify import certify
 from parameterize.compilation import compilation_told
+from parameterize.files import digest
 from parameterize.quality.quality import proved
 from parameterize.spline.body import BodyLike, as_body
 
 from ..options import MapOptions
 from ..report import advice
 from ..report import document as reports
-from .output_folder import RunFolder, digest
+from .output_folder import RunFolder
 
 log = logging.getLogger(__name__)
 
@@ -28,12 +29,18 @@ def certified_facts(volume: BodyLike) -> dict[str, Any]:
     return advice.with_unproved(facts, body, certificate)
 
 
-def write_certificate(state: RunFolder, path: Path, body: BodyLike, command: str) -> None:
-    """Certify a saved body, and write the sections of report.json about the input and the proof."""
+def write_certificate(
+    state: RunFolder, path: Path, body: BodyLike, command: str, identity: dict[str, Any] | None = None
+) -> None:
+    """Certify a saved body, and write the sections of report.json about the input and the proof.
+
+    identity: of a run that others may resume.
+    """
     with state.timed("certify"):
         facts = facts_of_file(path, body)
     state.write(
         command=command,
+        **({} if identity is None else {"identity": identity}),
         input={"file": str(path), "sha256": digest(path)},
         versions=reports.versions(),
         parameterization=facts,

@@ -73,6 +73,7 @@ class Reason(StrEnum):
     EXACT = "exact", "the blocks are the body, and nothing is left to optimise."
     LAID = "laid", "the blocks follow the outlines of the body, and are left as they are."
     CURVED = "curved", "the hexahedra are curved onto the part, and are left as they are."
+    OUT_OF_TIME = "out of time", "the time limit leaves no time for another round."
     OUT_OF_ROUNDS = "out of rounds", "the stage has had all its rounds."
 
     def __new__(cls, name: str, sentence: str) -> "Reason":

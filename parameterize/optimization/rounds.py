@@ -8,6 +8,7 @@ The map so found is then interpolated on the fine knots, for the other rounds.
 """
 
 import logging
+import time
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -18,6 +19,7 @@ from ..progress import History, Progress, ProgressCallback, ignore, timed
 from ..spline.bspline import open_uniform_knots
 from ..spline.spline_map import SplineMap
 from ..threads import one_blas_thread
+from ..time_limit import OutOfTime, check_time, cut_short, seconds_left, seconds_to_spare
 from .endings import CertifiedMap, Course, Reason
 from .energy import SplineEnergy
 from .newton import FIRST_GAIN, Point, StoppingRule, descend
@@ -51,6 +53,8 @@ def optimize(
     proved not to meet itself; or else the last certified map whose boundary is undecided; or else the last certified
     map; or else the map with the fewest unproved spans.
 
+    Where a time limit leaves no time for another round, the rounds end with what they have.
+
     begun: the number of rounds on other knots that have led to `start`. watched: (k, 4), the spans that nearly fold in
     `start`. A checkpoint is kept after every round. After the call, the surface's parameters belong to the returned
     map.
@@ -64,16 +68,41 @@ def optimize(
         first = CertifiedMap.of(start)
         state = State(energy, start, first, surface.sliding.on_faces, number=begun, halved=begun)
         state.restore(checkpoints, history)
+        pace = _Pace()
         for phase in schedule.phases:
             while (reason := phase.done(state)) is None and state.number < schedule.rounds:
-                with timed(state.seconds, phase.name):
-                    _round(state, phase, schedule, _StepReport(state.number, config.steps, schedule, history, progress))
+                if not pace.allows(state):
+                    reason = Reason.OUT_OF_TIME
+                    break
+                try:
+                    with timed(state.seconds, phase.name):
+                        told = _StepReport(state.number, config.steps, schedule, history, progress)
+                        _round(state, phase, schedule, told)
+                except OutOfTime:
+                    reason = Reason.OUT_OF_TIME
+                    break
                 state.save(checkpoints, history)
             ending = reason or Reason.OUT_OF_ROUNDS
             if ending.ends_the_rounds:
                 break
+        if ending is Reason.OUT_OF_TIME:
+            cut_short(f"the rounds of the spline, after {state.number}")
         surface.sliding.place(*state.best_parameters)
     return state.best, Course(state.rounds, state.seconds, ending)
+
+
+class _Pace:
+    """Say whether a time limit allows another round: it takes as long as the one before."""
+
+    def __init__(self) -> None:
+        self._before, self._last = time.monotonic(), 0.0
+
+    def allows(self, state: State) -> bool:
+        """Return whether there is time: rounds on a map without faults leave more of it to later stages."""
+        now = time.monotonic()
+        self._before, self._last = now, now - self._before
+        left = seconds_left() if any(state.best.faults) else seconds_to_spare()
+        return left > self._last
 
 
 def _round(state: State, phase: Phase, schedule: Schedule, report: "_StepReport") -> None:
@@ -120,6 +149,7 @@ class _StepReport:
 
     def __call__(self, point: Point) -> None:
         """Report the point after a step."""
+        check_time()
         done, loss = self.number * self.most + self.step, point.total
         self.history.add("spline", done, loss, point.folded, {"surface": point.outer[0]})
         steps = self.schedule.rounds * self.most  # at most: a round ends once it gains nothing more

@@ -23,6 +23,7 @@ from ..layouts.rods.along_skeleton import LayoutError
 from ..layouts.skeleton.graph import SkeletonError
 from ..progress import timed
 from ..threads import one_blas_thread
+from ..time_limit import OutOfTime, cut_short, seconds_left
 from .blocks import BLOCKS
 from .cost import Cost
 from .growth import GROWTH, LAST, STIFF
@@ -113,8 +114,17 @@ def attempts(task: MappingTask, ways: tuple[Way, ...], checkpoints: Checkpoints)
             continue
         if tried:
             _tell(tried[-1], way)
-        before = dict(task.seconds)
-        attempt = way.make(task, checkpoints.of_part(len(tried)) if tried else checkpoints)
+        before, has_map = dict(task.seconds), any(one.attempt is not None for one in tried)
+        if has_map and seconds_left() <= 0.0:
+            cut_short(f"the ways to a map, before {way.name}")
+            break
+        try:
+            attempt = way.make(task, checkpoints.of_part(len(tried)) if tried else checkpoints)
+        except OutOfTime:
+            if not has_map:
+                raise
+            cut_short(f"the ways to a map, in {way.name}")
+            break
         spent = {step: seconds - before.get(step, 0.0) for step, seconds in task.seconds.items()}
         tried += (Tried(way, attempt, spent),)
     if all(one.attempt is None for one in tried):
