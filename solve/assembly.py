@@ -69,11 +69,10 @@ class Assembled(NamedTuple):
 
     def renewed(self, patches: Sequence[Stated]) -> "Assembled":
         """Return the same matrix with other data, which act on the same places."""
-        matrix, nothing = self.matrix, Form()
-        nothing.components = self.loads.components
+        matrix = self.matrix
         each = zip(matrix.laws, patches, _in_volumes(patches), strict=True)
         laws = [
-            law._replace(form=nothing, source=patch.problem.source_at, component=None, same=same)
+            law._replace(form=_OfLoads(patch.problem.form), source=patch.problem.source_at, component=None, same=same)
             for law, patch, same in each
         ]
         _, loads = assemble_body(matrix.layout, laws, matrix.parts[0].threads)
@@ -86,6 +85,22 @@ class Assembled(NamedTuple):
         else:
             _on_faces(patches, _in_volumes(patches), loads)
         return Assembled(matrix, loads, _known(patches, matrix.layout), conditions)
+
+
+class _OfLoads(Form):
+    """Stand for a law of which the loads alone are assembled."""
+
+    def __init__(self, law: Form) -> None:
+        self.law, self.components = law, law.components
+
+    @property
+    def has_initial_flux(self) -> bool:
+        """Return whether the law has an initial flux."""
+        return self.law.has_initial_flux
+
+    def initial_flux(self, x: Any) -> Any:
+        """Return that of the law."""
+        return self.law.initial_flux(x)
 
 
 def assemble_body_data(patches: Sequence[Stated], options: SolveOptions, unknowns: Unknowns | None = None) -> Assembled:

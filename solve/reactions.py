@@ -103,7 +103,7 @@ def balance(
     for face in faces:
         here, on_face = [patches[place].problem for place in face.patches], full.of(face.patches)
         if isinstance(face, WeakFace):
-            own = own - (face.weights * face.gamma * face.values).sum(axis=1)
+            own = own - (face.weights * (face.gamma * face.values + face.held_initial)).sum(axis=1)
             own = own - _add_regions(here[0], face, on_face, supports)
         elif isinstance(face, FaceRule):
             own = own - _add_robin_faces(here, face, on_face, supports)

@@ -8,7 +8,7 @@ from iga_nn.report.extremes import peak_notices
 from iga_nn.workflow.solving import level_of
 from parameterize.spline.volume import BSplineVolume
 from solve import benchmark_volume, integrate, resultant
-from solve.forms.elasticity import outer_principal, principal, von_mises
+from solve.forms.stresses import outer_principal, principal, von_mises
 
 YOUNG, NU = 210.0, 0.3
 TENSION = ("x", f"-{NU}*y", f"-{NU}*z")  # a bar in tension of stress YOUNG along x

@@ -154,6 +154,9 @@ def _piece(
     given = data.given(np.stack(nets), names, each)
     across = jacobian[:, :, axis].T
     flat = np.abs((across * normal).sum(axis=0)) < FLAT * np.linalg.norm(across, axis=0)
+    initial = np.zeros((problem.form.components, 3, len(owners)))
+    if problem.form.has_initial_flux:
+        initial += problem.form.initial_flux(x)
     at = _Traces(problem, grid.face, owners, where, normal, given, flat)
     return BoundaryPiece(
         group=group,
@@ -164,8 +167,8 @@ def _piece(
         weights=weights,
         curvature=curvature(group, owners, where, axis, jacobian, normal),
         elements=each * (1 + int(grid.spans.max())) + np.tile(grid.spans, len(chosen)),
-        u=at.values(group, given.loads, np.ones(len(where), dtype=bool)),
-        z=tuple(at.values(one, np.zeros_like(given.loads), flat) for one in of_z),
+        u=at.values(group, given.loads, np.ones(len(where), dtype=bool), initial),
+        z=tuple(at.values(one, np.zeros_like(given.loads), flat, np.zeros_like(initial)) for one in of_z),
         source=np.asarray(problem.source_at(x)),
         given=given,
     )
@@ -198,18 +201,21 @@ class _Traces:
     given: Given
     flat: Mask
 
-    def values(self, group: FieldGroup, loads: Array, known: Mask) -> Values:
-        """Return a function with a given flux; its free normal derivatives follow from the flux at points `known`."""
+    def values(self, group: FieldGroup, loads: Array, known: Mask, initial: Array) -> Values:
+        """Return a function with a given flux; its free normal derivatives follow from the flux at points `known`.
+
+        initial: (c, 3, m), what is added to the flux of the function: the law's initial flux of a solution.
+        """
         form, c, m = self.problem.form, self.problem.form.components, len(self.where)
         steep = self._steep(group)
 
         def every(u: Array, grad: Array, x: Array) -> Array:
             along = grad - np.einsum("cam,am,bm->cbm", grad, self.normal, self.normal)
             held = np.einsum("cdm,dm->cm", self.given.projector, steep)
-            pull = loads - np.einsum("cdm,dm->cm", self.given.factor, u)
+            pull = loads - np.einsum("cdm,dm->cm", self.given.factor, u) - (initial * self.normal).sum(axis=1)
             slope = np.where(known, self._slope(u, along + held[:, None] * self.normal, x, pull) + held, steep)
             found = along + slope[:, None] * self.normal
-            flux = np.asarray(form.flux(u, found, x), dtype=np.float64)
+            flux = np.asarray(form.flux(u, found, x), dtype=np.float64) + initial
             pressure = getattr(x, "pressure", None)
             parts = [u, found.reshape(3 * c, m), flux.reshape(3 * c, m), reaction(form, u, found, x)]
             return np.concatenate([*parts, *([] if pressure is None else [pressure[None]])])

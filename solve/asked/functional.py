@@ -20,7 +20,7 @@ from ..forms.boundary_value_problem import BoundaryValueProblem
 from ..forms.form import Form, Quantity
 from ..forms.frame import UnitFrame
 from .linearised import joined, sampled
-from .named import demand_fit, dimension_of, energy_density, named
+from .named import demand_fit, dimension_of, named
 from .parts import Part, Piece, Scattered
 from .samples import Samples
 from .search import Excluded, extreme_inside, extreme_on_boundary
@@ -74,7 +74,7 @@ class Functional(ABC):
 
     def quantity_of(self, form: Form) -> Quantity:
         """Return the quantity of a law that is evaluated at points."""
-        return energy_density(form) if self.ask.kind == "energy" else named(form, self.ask.quantity)
+        return form.energy if self.ask.kind == "energy" else named(form, self.ask.quantity)
 
 
 @dataclass(frozen=True, eq=False)
@@ -204,7 +204,7 @@ class Flow(Functional):
         return "xyz".index(self.ask.direction) if self.ask.direction else 0
 
     def _flux(self, piece: Piece) -> Array:
-        return piece.values(lambda form: form.flux)[self._component]
+        return piece.values(lambda form: form.whole_flux)[self._component]
 
     def samples(self, solution: FieldOnBody) -> Samples:
         """Return the points of the quadrature."""
@@ -215,7 +215,7 @@ class Flow(Functional):
         assert normal is not None
 
         def through(form: Form) -> Quantity:
-            return lambda u, grad, x: (np.asarray(form.flux(u, grad, x))[self._component] * normal).sum(axis=0)
+            return lambda u, grad, x: (np.asarray(form.whole_flux(u, grad, x))[self._component] * normal).sum(axis=0)
 
         return sampled([(piece, piece.weights)], through)
 

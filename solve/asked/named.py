@@ -10,7 +10,7 @@ from ..answer import Dimension
 from ..ask import Ask
 from ..forms.boundary_value_problem import BoundaryValueProblem
 from ..forms.elasticity import Elasticity
-from ..forms.form import Form, Quantity, reaction
+from ..forms.form import Form, Quantity
 
 AXES = "xyz"
 _COMPONENT = re.compile(r"(?P<whole>\w+)_(?P<axes>[xyz]{1,2})")
@@ -47,16 +47,6 @@ def named(form: Form, name: str) -> Quantity:
 def own_names(form: Form) -> tuple[str, ...]:
     """Return the names of the components of u."""
     return {1: ("u", "T"), 3: ("ux", "uy", "uz")}.get(form.components, ())
-
-
-def energy_density(form: Form) -> Quantity:
-    """Return half of flux : grad u + react . u, whose integral is the energy 1/2 a(u, u) of the body."""
-
-    def density(u: Any, grad: Any, x: Any) -> Any:
-        inside = (np.asarray(form.flux(u, grad, x)) * grad).sum(axis=(0, 1))
-        return 0.5 * (inside + (reaction(form, u, grad, x) * u).sum(axis=0))
-
-    return density
 
 
 def demand_fit(ask: Ask, problem: BoundaryValueProblem) -> None:

@@ -78,7 +78,12 @@ def _adjoint(system: System, solution: Solution, own: OwnChange) -> BodyField | 
 
 
 def _does_no_work(system: System) -> bool:
-    """Return whether supports do no work: all given values are zero, and no exchange takes a part of the energy."""
+    """Return whether supports do no work: all given values are zero, and no exchange takes a part of the energy.
+
+    An initial flux makes the energy another one than 1/2 a(u, u).
+    """
+    if system.problem.form.has_initial_flux:
+        return False
     patches = [patch.problem for patch in system.stated]
     exchanges = any(one.factor is not None for own in patches for one in (*own.conditions, *own.faces))
     return not system.has_given_values and not exchanges

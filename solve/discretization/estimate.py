@@ -237,7 +237,7 @@ def _on_regions(held: OnRegions) -> Array:
     face, space, coefficients = held
     form, (u, flux) = face.form, face.traces(coefficients)
     free = np.eye(form.components)[:, :, None] - face.projector
-    missing = face.loads - np.einsum("cdm,dm->cm", free, flux) - np.einsum("cdm,dm->cm", face.factor, u)
+    missing = face.loads - np.einsum("cdm,dm->cm", free, flux + face.initial) - np.einsum("cdm,dm->cm", face.factor, u)
     lack = face.values - np.einsum("cdm,dm->cm", face.projector, u)
     cells, one, other = _cells(space, face)
     across = _across(form, face.normal, face.x)

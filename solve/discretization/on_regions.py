@@ -21,6 +21,7 @@ from parameterize.spline.volume import FACE_NAMES, BSplineVolume
 from ..field import Points, part_of
 from ..forms.boundary_value_problem import BoundaryValueProblem
 from ..forms.conditions import Condition, Value
+from ..forms.form import Form
 from ..forms.region import FacesOfPoints, tolerances
 from .face_data import has_face
 from .processes import Processes
@@ -210,7 +211,15 @@ def renewed(face: WeakFace, problem: BoundaryValueProblem) -> WeakFace:
     acting = Acting(problem, face.x, face.normal, face.weights, face.codes)
     projector, values = acting.held()
     loads, factor = acting.natural(projector)
-    return replace(face, values=values, loads=loads, factor=factor)
+    initial = initial_through(problem.form, face.x, face.normal)
+    return replace(face, values=values, loads=loads, factor=factor, initial=initial)
+
+
+def initial_through(form: Form, x: Points, normal: Array) -> Array:
+    """Return the law's initial flux (c, m) at points along normals (3, m); zero of a law that has none."""
+    if not form.has_initial_flux:
+        return np.zeros((form.components, len(normal[0])))
+    return np.asarray((form.initial_flux(x) * normal).sum(axis=1), dtype=np.float64)
 
 
 @dataclass(frozen=True, eq=False)
@@ -360,6 +369,7 @@ class _Builder:
             slowest=slowest,
             factor=factor,
             loads=loads,
+            initial=initial_through(form, x, normal),
             is_whole=held > WHOLE,
             tables=tables,
             slope=slope,

@@ -228,6 +228,8 @@ def assemble_stack(
 ) -> tuple[list[Any], Array | None, Array]:
     """Return the operators and the loads (k, c, n_u, n_v, n_w) of the laws of a stack's patches, as `assemble` does.
 
+    A law's initial flux, tested with the gradients, is a part of the load where there is a source.
+
     What the operators store at the points, factors or rows, is part of one array (k, q_u, .., q_w, q_v), which is
     returned between them; None where they store nothing.
     """
@@ -253,6 +255,11 @@ def assemble_stack(
             if source is not None:
                 densities = source(x).reshape(-1, *shape) * size
                 stack.add_integrals(patches, q, np.moveaxis(densities, 1, 0), loads)
+                if law.has_initial_flux:
+                    flux = of_patches(
+                        law.initial_flux(x) * (np.sqrt(size) if len(size) > 1 else np.sqrt(size[0])), size
+                    )
+                    _add_initial(stack, patches, q, flux, rows, loads)
 
     with stack.space.agreed():
         if component is not None:
@@ -271,6 +278,13 @@ def assemble_stack(
         else:
             found.append(Operator(space, rule, stack.threads, at_points, folded=folded[i]))
     return found, stored, loads
+
+
+def _add_initial(stack: PatchStack, patches: IntArray, q: int, flux: Array, rows: Array, loads: Array) -> None:
+    """Subtract a flux (m, c, 3, q_w, q_v), times the root of the measure, tested with gradients, from loads."""
+    fields = np.empty((len(flux), flux.shape[1], 4, *stack.plane_shape))
+    group_kernels.turn_fields(rows, np.ascontiguousarray(-flux), fields[:, :, 1:], True)
+    group_kernels.spread_splines(fields, patches, stack.kinds[patches], q, stack.tables, False, loads)
 
 
 def multiply_law(

@@ -119,7 +119,7 @@ class OnFace:
         """Return the flux (c, k, ...) out of the patches; it may be NaN where the map shrinks the face."""
         with np.errstate(invalid="ignore"):
             grad = np.stack([dot(self.inverse, [slope[c] for slope in self.slopes]) for c in range(len(self.u))])
-            flux = np.asarray(form.flux(self.u, grad, self.x), dtype=np.float64)
+            flux = np.asarray(form.whole_flux(self.u, grad, self.x), dtype=np.float64)
             return np.asarray((flux * self.normal).sum(axis=1))
 
 

@@ -44,7 +44,8 @@ class WeakFace:
     J^-1. codes: (m,), bit i + 1 where condition i holds. projector: (c, c, m), P. values: (c, m), P g. gamma: (m,),
     zero where P is. slowest: (m,), the law's factor over the depth of the cube behind the face, that is gamma without
     its constants on a single span. factor: (c, c, m), that of u in an exchange, outside of P. loads: (c, m),
-    the given flux into the body, outside of P. is_whole: (k,), whether some P is given at all points of the face.
+    the given flux into the body, outside of P. initial: (c, m), the law's initial flux . n, which is no part of t.
+    is_whole: (k,), whether some P is given at all points of the face.
 
     tables: (m, k n_b n_c) each, values of the faces' functions and their derivatives in the two directions. slope: the
     derivative across the face of the functions of its layer, minus that of the next layer. layers: the coefficients of
@@ -66,6 +67,7 @@ class WeakFace:
     slowest: Array
     factor: Array
     loads: Array
+    initial: Array
     is_whole: Mask
     tables: tuple[csr_array, csr_array, csr_array]
     slope: float
@@ -108,6 +110,11 @@ class WeakFace:
             own = self.factor[..., sprung]
             found[..., sprung] += own / np.linalg.eigvalsh(np.moveaxis(own, -1, 0))[:, -1]
         return found
+
+    @property
+    def held_initial(self) -> Array:
+        """Return the initial flux (c, m) along the directions that are held, P times it."""
+        return np.einsum("cdm,dm->cm", self.projector, self.initial)
 
     @property
     def axis(self) -> int:
@@ -199,7 +206,7 @@ class WeakFace:
 
     def add_load(self, load: Array) -> None:
         """Add the terms of the right-hand side to a load (k, c, n_u, n_v, n_w)."""
-        loads = self.weights * (self.loads + self.gamma * self.values)
+        loads = self.weights * (self.loads + self.held_initial + self.gamma * self.values)
         self._spread(loads, -self.weights * self.values, load)
 
     def add_diagonal(self, component: int, diagonal: Array) -> None:
@@ -247,7 +254,7 @@ class WeakFace:
         """
         u, flux = self.traces(coefficients)
         pull = self.gamma * (np.einsum("cdm,dm->cm", self.projector, u) - self.values)
-        density = np.einsum("cdm,dm->cm", self.projector, flux) - pull
+        density = np.einsum("cdm,dm->cm", self.projector, flux + self.initial) - pull
         return np.asarray((self.weights * density)[:, points].sum(axis=1))
 
     def add_force(self, direction: Array, points: Mask, result: Array) -> None:

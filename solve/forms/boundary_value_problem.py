@@ -367,7 +367,7 @@ class BoundaryValueProblem:
         if not self.exact_formulas:
             return np.zeros((self.form.components, *x.shape[1:]))
         u, grad = known(self._exact_jets(x, ()), x.shape[1:])
-        flux = (np.asarray(self.form.flux(u, grad, x), dtype=np.float64) * normal).sum(axis=1)
+        flux = (np.asarray(self.form.whole_flux(u, grad, x), dtype=np.float64) * normal).sum(axis=1)
         return finite(f"{name} (from exact)", flux, x, self._first_formula)
 
     def exact_at(self, x: Array) -> tuple[Array, Array | None]:

@@ -12,6 +12,7 @@ from parameterize.arrays import Array
 
 from ..field import FieldOnBody
 from .frame import UnitFrame
+from .jets import Jet
 from .owners import Owner, entry_of
 from .parser import Expression, ExpressionError
 
@@ -49,6 +50,11 @@ class Datum:
     def is_formula(self) -> bool:
         """Return whether all derivatives of the datum are known, as for formulas without where, min and max."""
         return len(self.formulas) == len(self.entries) and all(formula.is_smooth for formula in self.formulas)
+
+    @property
+    def is_constant(self) -> bool:
+        """Return whether all entries are formulas without variables."""
+        return len(self.formulas) == len(self.entries) and not any(entry.variables for entry in self.formulas)
 
     @property
     def is_zero(self) -> bool:
@@ -90,6 +96,18 @@ class Datum:
                 raise ValueError(message) from None
             parts.append(finite(self.name, found, x, entry))
         return np.stack(parts).reshape(self.components, *x.shape[1:])
+
+    def at(self, x: Any) -> Any:
+        """Return values (c, ...) at points (3, ...), or c jets at jets of points (3,).
+
+        On jets, derivatives of a function are not numbers.
+        """
+        if x.dtype != object:
+            return self(x)
+        if self.is_formula:
+            return [formula.jet(list(x)) for formula in self.formulas]
+        values = self(np.stack(np.broadcast_arrays(*(jet.value for jet in x))))
+        return [Jet(value, (np.nan,) * 3, ()) for value in values]
 
     def _called(self, function: Callable[[Array], ArrayLike], x: Array) -> ArrayLike:
         """Return the values of a user's function. Raises a ValueError that names the datum where the function fails."""

@@ -1,33 +1,45 @@
-"""Defines Elasticity: -div sigma(u) = f for an isotropic body, with displacement or traction on each face."""
+"""Defines Elasticity: -div sigma(u) = f for an elastic body, with displacement or traction on each face."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Hashable, Mapping, Sequence
+from collections.abc import Collection, Hashable, Iterator, Mapping, Sequence
 from copy import copy
 from dataclasses import KW_ONLY, dataclass, field
-from numbers import Real
 from typing import Any, ClassVar, Self
 
 import numpy as np
 
 from parameterize.arrays import Array
+from parameterize.spline.body import BodyLike
 
+from .axes import PARAMETERS, Tangents, frame
+from .boundary_value_problem import BoundaryValueProblem
 from .conditions import OF_BODIES, Condition, GivenRegions, OnFaces
-from .data import LARGEST, SMALLEST, Data
+from .data import NOT_SMOOTH, ByPatch, Data, Datum, PerPatch, parse
 from .form import Quantity
+from .hooke import Axes, Hooke, Lame
 from .inertia import with_inertia
+from .library import material as of_library
+from .material import Constants, Material
 from .owners import Owner, entry_of
 from .problem import LawWithData
+from .stresses import outer_principal, principal, von_mises
 
 NONE = ("0", "0", "0")  # of a vector
 
 
 NEARLY_RIGID = 0.45  # Poisson's ratio from which on the estimate of the error was 30 to 500 times too large
+MOST_SAFE = 1e6  # the largest safety that is told: that of no stress, and of solids without a yield strength
+CONSTANTS = ("young", "poisson_ratio", "shear_modulus", "expansion", "yield_strength")  # of a material
+AXES = ("first_axis", "second_axis")
+ALONG_X, ALONG_Y = (parse(name, axis, 3) for name, axis in zip(AXES, (("1", "0", "0"), ("0", "1", "0")), strict=True))
 
 
 @dataclass(frozen=True)
 class Elasticity(LawWithData):
-    """Linear elasticity of an isotropic body: -div sigma = f, sigma = lambda div(u) I + mu (grad u + grad u^T).
+    """Linear elasticity of a body: -div sigma = f, sigma = lambda div(u) I + mu (grad u + grad u^T).
+
+    An orthotropic material has sigma = C : eps; thermal strain is subtracted from eps in both.
 
     Each vector is given as three entries: formulas in x, y, z and X, Y, Z (as in `Poisson`), functions of three arrays
     x, y, z of equal shape, or fields on the same volume.
@@ -47,8 +59,10 @@ class Elasticity(LawWithData):
         `iga_nn.modes` takes a free body, too.
     young : float
         E > 0. On several patches or solids also a dictionary: a number for each patch, or for the name of each solid.
+        Three numbers E1, E2, E3 are those of an orthotropic material.
     poisson_ratio : float
-        -1 < nu < 1/2, or a dictionary as `young`. `lame` converts from lambda and mu.
+        -1 < nu < 1/2, or a dictionary as `young`. `lame` converts from lambda and mu. Of an orthotropic material nu12,
+        nu13, nu23; nu12 is the contraction along axis 2 of a pull along axis 1.
     conditions : sequence of conditions such as Fix or Load, optional
         Supports and loads on regions of the boundary. Where a region is given, the rest of the boundary is free, or has
         the traction of `exact`; `displacement` and `traction` are left out then.
@@ -65,6 +79,20 @@ class Elasticity(LawWithData):
         The acceleration of the body, whose mass resists it: the load is minus the density times it.
     spin : pair of three numbers each, optional
         The angular velocity, in radians per time, and a point on the axis: ((0, 0, 314), (0, 0, 0)).
+    material : str or Material, optional
+        A material of `iga_nn.material` by its name, or one of your own, in place of its constants; or a dictionary as
+        `young`. Lengths are millimetres and stresses MPa then, unless the material is in metres.
+    shear_modulus : three float, optional
+        G12, G13, G23 of an orthotropic material, or a dictionary as `young`.
+    first_axis, second_axis : "u", "v", "w" or three entries, optional
+        The material's axis 1, and a vector towards axis 2, in space: a parameter stands for the direction of its lines.
+        By default x and y; a first axis alone serves where the material is the same all around it.
+    expansion : float or three, optional
+        Thermal strain per kelvin, or three along the axes; or a dictionary as `young`.
+    temperature_change : entry, optional
+        The temperature above that without thermal strain; a field as of a heat problem's solution, too.
+    yield_strength : float, optional
+        The stress that `safety` divides by von Mises' stress, or a dictionary as `young`, None for a solid without one.
     force : three entries, optional
         The former name of `body_force`.
 
@@ -88,8 +116,8 @@ class Elasticity(LawWithData):
     body_force: Data | None = None
     displacement: Data | None = None
     traction: OnFaces = field(default_factory=dict)
-    young: float | Mapping[Owner, float] = 1.0
-    poisson_ratio: float | Mapping[Owner, float] = 0.3
+    young: Constants | Mapping[Owner, Constants] = 1.0
+    poisson_ratio: Constants | Mapping[Owner, Constants] = 0.3
     _: KW_ONLY
     conditions: Sequence[Condition] = ()  # type: ignore[assignment]  # a tuple once the problem is made
     fix: GivenRegions | None = None
@@ -110,20 +138,23 @@ class Elasticity(LawWithData):
     gravity: Sequence[float] | None = None
     acceleration: Sequence[float] | None = None
     spin: tuple[Sequence[float], Sequence[float]] | None = None
+    material: str | Material | Mapping[Owner, str | Material] | None = None
+    shear_modulus: Constants | Mapping[Owner, Constants | None] | None = None
+    first_axis: PerPatch | None = None
+    second_axis: PerPatch | None = None
+    expansion: Constants | Mapping[Owner, Constants | None] | None = None
+    temperature_change: PerPatch | None = None
+    yield_strength: float | Mapping[Owner, float | None] | None = None
     force: Data | None = None
 
+    hooke: Hooke = field(init=False, repr=False, compare=False)  # of several solids, that of the first
+
     components = 3
-    constant = True
     labels: ClassVar = {"source": "body_force", "boundary": "displacement", "neumann": "traction"}
     keywords: ClassVar = OF_BODIES
 
     def __post_init__(self) -> None:
-        for young in _values(self.young):
-            if not (isinstance(young, Real) and SMALLEST <= young <= LARGEST):
-                raise ValueError(f"young must be a positive number from {SMALLEST:g} to {LARGEST:g}, got {young!r:.80}")
-        for ratio in _values(self.poisson_ratio):
-            if not (isinstance(ratio, Real) and -1.0 < ratio < 0.5):
-                raise ValueError(f"poisson_ratio must lie between -1 and 1/2, got {ratio!r:.80}")
+        self._read_material()
         self._read_keywords()
         if self.force is not None:
             if self.body_force is not None:
@@ -133,7 +164,13 @@ class Elasticity(LawWithData):
         mass = self.density, self.gravity, self.acceleration, self.spin
         force = with_inertia(self.body_force, *mass, has_exact=self.exact is not None)
         force = NONE if force is None and self.exact is None and is_loaded else force
-        self._set({"exact": self.exact, "source": force}, self.displacement, self.traction)
+        given = {"exact": self.exact, "source": force, "temperature_change": self.temperature_change}
+        vectors = {role: getattr(self, role) for role in AXES if role not in self._along_parameters}
+        counts = {"temperature_change": 1} | dict.fromkeys(AXES, 3)
+        self._assign(data={})
+        self._assign(hooke=self._first_hooke())
+        self._set(given | vectors, self.displacement, self.traction, **counts)
+        self._assign(hooke=self._first_hooke())  # along its axes, which are data
 
     def demand_held(self) -> None:
         """Raise ValueError where traction on all six faces leaves the body free to move."""
@@ -149,46 +186,168 @@ class Elasticity(LawWithData):
         return {"young": shear * (3.0 * first + 2.0 * shear) / total, "poisson_ratio": first / (2.0 * total)}
 
     @property
-    def constants(self) -> tuple[float, float]:
-        """Return Lame's constants lambda and mu; where they are given by patch or solid, those of the first."""
-        young, nu = _values(self.young)[0], _values(self.poisson_ratio)[0]
-        return young * nu / ((1.0 + nu) * (1.0 - 2.0 * nu)), young / (2.0 * (1.0 + nu))
+    def constants(self) -> Lame:
+        """Return Lame's constants lambda and mu; where they are given by patch or solid, those of the first.
+
+        Of an orthotropic material they are those of the nearest isotropic one.
+        """
+        return self.hooke.lame
+
+    def _read_material(self) -> None:
+        """Turn materials into their constants, and numbers in a row into tuples.
+
+        Raises ValueError for a material beside constants of its own, and for thermal data without the other one.
+        """
+        if self.material is not None:
+            if beside := [name for name in CONSTANTS if getattr(self, name) != getattr(Elasticity, name)]:
+                raise ValueError(f"material and {beside[0]}: give one of them, the material has its own {beside[0]}")
+            owners = self.material if isinstance(self.material, Mapping) else {None: self.material}
+            found = {who: own if isinstance(own, Material) else of_library(own) for who, own in owners.items()}
+            if len(units := {own.unit for own in found.values()}) > 1:
+                raise ValueError(f"material: the solids' units differ, {' and '.join(sorted(units))}: use in_unit")
+            for name in CONSTANTS:
+                own = {who: getattr(one, name) for who, one in found.items()}
+                self._assign(**{name: own if isinstance(self.material, Mapping) else own[None]})
+            if self.density is None:
+                mass = {who: one.density for who, one in found.items()}
+                self._assign(density=mass if isinstance(self.material, Mapping) else mass[None])
+            self._assign(material=None)
+        for name in CONSTANTS[:-1]:
+            given = getattr(self, name)
+            by_owner = {who: _row(own) for who, own in given.items()} if isinstance(given, Mapping) else _row(given)
+            self._assign(**{name: by_owner})
+        if self.temperature_change is not None and all(own in (None, 0.0) for own in _values(self.expansion)):
+            raise ValueError("temperature_change needs the material's thermal strain per kelvin: give expansion=12e-6")
+        for strength in _values(self.yield_strength):
+            if strength is not None and not 0.0 < strength < np.inf:
+                raise ValueError(f"yield_strength must be a positive number, got {strength!r:.80}")
+
+    @property
+    def _along_parameters(self) -> dict[str, str]:
+        """Return the axes that are given as parameters of the map."""
+        given = {role: getattr(self, role) for role in AXES}
+        return {role: own for role, own in given.items() if isinstance(own, str) and own in PARAMETERS}
+
+    def _first_hooke(self) -> Hooke:
+        """Return the law of a patch, or of the first one where several are given. Raises ValueError for any of them."""
+        every = [getattr(self, name) for name in CONSTANTS[:-1]]
+        owners = {who: None for own in every if isinstance(own, Mapping) for who in own}
+        found = [Hooke(*each, axes=self._fixed_axes) for each in _of_owners(every, owners)]
+        for hooke in found:
+            if hooke.shear_modulus is not None and self.first_axis is not None and self.second_axis is None:
+                hooke.demand_the_same_across()
+        return found[0]
+
+    @property
+    def _fixed_axes(self) -> Axes | None:
+        """Return the axes where they are the same at all points, and other ones than x, y, z; otherwise None."""
+        if self.first_axis is None and self.second_axis is None or self._axes_change:
+            return None
+        rows = self._axes_at(np.zeros((3, 1)))
+        return tuple(tuple(float(np.ravel(entry)[0]) for entry in row) for row in rows)  # type: ignore[return-value]
+
+    @property
+    def _axes_change(self) -> bool:
+        """Return whether the axes of the material may differ from point to point, or from patch to patch."""
+        data = [self.data[role] for role in AXES if role in self.data]
+        fixed = [not isinstance(own, ByPatch) and own.is_constant for own in data]
+        return bool(self._along_parameters) or not all(fixed)
+
+    def _axes_at(self, x: Any) -> Any:
+        """Return the axes, three rows of entries (...), at points x (3, ...) or at jets of points."""
+        first = self.data.get("first_axis", ALONG_X)
+        default = ALONG_Y if "first_axis" not in self.data else None
+        return frame(first, self.data.get("second_axis", default), x)
+
+    def _moving_axes(self, x: Any) -> Any:
+        """Return the axes at points; None where the law knows them, or needs none."""
+        return self._axes_at(x) if self._turns else None
+
+    @property
+    def _turns(self) -> bool:
+        return not self.hooke.is_isotropic and self._axes_change
+
+    @property
+    def constant(self) -> bool:  # type: ignore[override]
+        """Return whether the stiffness is the same at all points of a patch."""
+        return not self._turns
 
     @property
     def by_patch(self) -> dict[str, Collection[Owner]]:
         """Return the patches or solids for which data are given one by one, by the name of the datum."""
-        given = {name: getattr(self, name) for name in ("young", "poisson_ratio")}
+        given = {name: getattr(self, name) for name in CONSTANTS}
         return super().by_patch | {name: own.keys() for name, own in given.items() if isinstance(own, Mapping)}
+
+    def on(self, body: BodyLike) -> Self:
+        """Return the same problem on a body, along whose parameters the axes of a material may be."""
+        if not self._along_parameters:
+            return super().on(body)
+        others = {role: own for role, own in self.data.items() if role not in self._along_parameters}
+        found = BoundaryValueProblem.on(copy(self)._assign(data=others), body)
+        lines = {role: Datum(role, (Tangents.of(body, own),), 3) for role, own in self._along_parameters.items()}
+        return copy(found)._assign(data={**found.data, **lines})
 
     def of_patch(self, patch: int, solid: str = "") -> Self:
         """Return the problem with the data and the material of a patch and its solid."""
-        own = {name: entry_of(getattr(self, name), patch, solid) for name in ("young", "poisson_ratio")}
-        return super().of_patch(patch, solid)._assign(**own)
+        own = {name: entry_of(getattr(self, name), patch, solid) for name in CONSTANTS}
+        if isinstance(self.yield_strength, Mapping) and own["yield_strength"] is None:
+            own["yield_strength"] = np.inf
+        found = super().of_patch(patch, solid)._assign(**own)
+        return found._assign(hooke=found._first_hooke())
 
     @property
     def in_volume(self) -> Hashable:
         """Return what the law and its data in the volume are made of: the same for patches where they are the same."""
-        return super().in_volume, self.constants
+        return super().in_volume, self.hooke, self.yield_strength if not isinstance(self.yield_strength, Mapping) else 0
 
     def flux(self, u: Any, grad: Any, x: Any) -> Any:
-        """Return the stress sigma (3, 3, ...): 2 mu eps - p I, p the pressure of the points x or -lambda div u."""
-        lam, mu = self.constants
-        stress = grad + np.swapaxes(grad, 0, 1)
-        stress *= mu
-        known = getattr(x, "pressure", None)
-        pull = lam * (grad[0, 0] + grad[1, 1] + grad[2, 2]) if known is None else -known
-        for i in range(3):
-            stress[i, i] += pull
-        return stress
+        """Return the stress sigma (3, 3, ...) without its thermal part.
+
+        Of an isotropic material it is 2 mu eps - p I, p the pressure of the points x or -lambda div u.
+        """
+        return self.hooke.stress(grad, getattr(x, "pressure", None), self._moving_axes(x))
+
+    @property
+    def has_initial_flux(self) -> bool:
+        """Return whether the body has thermal stress."""
+        return "temperature_change" in self.data
+
+    def initial_flux(self, x: Any) -> Any:
+        """Return the stress (3, 3, ...) of a body at rest, which holds its thermal strain back."""
+        change = self.data["temperature_change"].at(x)[0]
+        return -self.hooke.of_change(self.hooke.hold, change, self._moving_axes(x))
+
+    def energy(self, u: Any, grad: Any, x: Any) -> Any:
+        """Return half of stress : (strain - thermal strain), (...)."""
+        if not self.has_initial_flux:
+            return super().energy(u, grad, x)
+        change = self.data["temperature_change"].at(x)[0]
+        growth = self.hooke.of_change(self.hooke.growth, change, self._moving_axes(x))
+        return 0.5 * (self.whole_flux(u, grad, x) * (grad - growth)).sum(axis=(0, 1))
+
+    @property
+    def not_differentiable(self) -> str:
+        """Return why the derivatives of the temperature or of the axes are unknown; "" where they are known."""
+        for role in ("temperature_change", *AXES):
+            if role in self._along_parameters:
+                return f"{role} is along a parameter, whose derivatives are not taken"
+            if role in self.data and not self.data[role].is_formula:
+                return f"{role} is {NOT_SMOOTH}"
+        return super().not_differentiable
+
+    @property
+    def loads(self) -> list[str]:
+        """Return the names of what acts on the body."""
+        return [*super().loads, *(["temperature_change"] if self.has_initial_flux else [])]
 
     def without_volume(self) -> Self:
         """Return the law 2 mu eps, which a pressure completes; its data are those of this law."""
-        return copy(self)._assign(young=2.0 * self.constants[1], poisson_ratio=0.0)
+        return copy(self)._assign(hooke=self.hooke.without_volume())
 
     @property
     def caveat(self) -> str:
         """Return why a nearly incompressible body is hard to solve and its error not estimated; "" for other bodies."""
-        nu = max(_values(self.poisson_ratio))
+        nu = max((own for own in _values(self.poisson_ratio) if isinstance(own, float)), default=0.0)
         return (
             f"Poisson's ratio {nu:g} is near 1/2, where a body hardly changes its volume" if nu > NEARLY_RIGID else ""
         )
@@ -205,64 +364,54 @@ class Elasticity(LawWithData):
 
         Beside those of every law these are strain and stress (3, 3, ...), von Mises' stress (...), the pressure
         (...), which is minus a third of the stresses' sum, the principal stresses (3, ...), and the first and the third
-        principal stress (...).
+        principal stress (...). With a yield strength there is its quotient by von Mises' stress, the safety (...).
         """
         return {
             **super().quantities,
             "strain": lambda u, grad, x: 0.5 * (grad + np.swapaxes(grad, 0, 1)),
-            "stress": self.flux,
-            "von_mises": lambda u, grad, x: von_mises(self.flux(u, grad, x)),
-            "pressure": lambda u, grad, x: -np.trace(self.flux(u, grad, x)) / 3.0,
-            "principal": lambda u, grad, x: principal(self.flux(u, grad, x)),
-            "first_principal": lambda u, grad, x: outer_principal(self.flux(u, grad, x))[0],
-            "third_principal": lambda u, grad, x: outer_principal(self.flux(u, grad, x))[1],
+            "stress": self.whole_flux,
+            "von_mises": lambda u, grad, x: von_mises(self.whole_flux(u, grad, x)),
+            "pressure": lambda u, grad, x: -np.trace(self.whole_flux(u, grad, x)) / 3.0,
+            "principal": lambda u, grad, x: principal(self.whole_flux(u, grad, x)),
+            "first_principal": lambda u, grad, x: outer_principal(self.whole_flux(u, grad, x))[0],
+            "third_principal": lambda u, grad, x: outer_principal(self.whole_flux(u, grad, x))[1],
+            **({} if self.yield_strength is None else {"safety": self._safety}),
         }
+
+    def _safety(self, u: Any, grad: Any, x: Any) -> Any:
+        """Return the yield strength over von Mises' stress (...), up to MOST_SAFE."""
+        strength = float(_values(self.yield_strength)[0] or np.inf)
+        equivalent = von_mises(self.whole_flux(u, grad, x))
+        return np.minimum(MOST_SAFE, strength / np.maximum(equivalent, np.finfo(float).tiny))
 
     @property
     def reported(self) -> tuple[str, ...]:
-        """Return the names: the displacement's length, von Mises' stress, the first and the third principal stress."""
-        return ("magnitude", "von_mises", "first_principal", "third_principal")
+        """Return the names: the displacement's length, von Mises' stress, the outer principal stresses."""
+        more = () if self.yield_strength is None else ("safety",)
+        return ("magnitude", "von_mises", "first_principal", "third_principal", *more)
 
     def symbol(self, wave: Array, x: Array) -> Array:
-        """Return mu (k . k), the factor of shear waves, which is the least factor, for wave vectors k (3, ...)."""
+        """Return the least factor (...) for wave vectors k (3, ...); of an isotropic body mu (k . k)."""
+        if not self.hooke.is_isotropic:
+            return super().symbol(wave, x)
         found: Array = self.constants[1] * (wave * wave).sum(axis=0)
         return found
 
 
-def _values(material: float | Mapping[Owner, float]) -> list[float]:
-    """Return a number of the material as a list, or the numbers of the patches or solids."""
-    return list(material.values()) if isinstance(material, Mapping) else [material]
+def _values(given: Any) -> list[Any]:
+    """Return a constant of the material as a list, or the constants of the patches or solids."""
+    return list(given.values()) if isinstance(given, Mapping) else [given]
 
 
-def von_mises(stress: Array) -> Array:
-    """Return von Mises' equivalent stress (...) of a stress tensor (3, 3, ...): sqrt(3/2 s : s), s its deviator."""
-    deviator = stress - _mean_pressure(stress)
-    return np.asarray(np.sqrt(1.5 * (deviator * deviator).sum(axis=(0, 1))))
+def _row(given: Any) -> Any:
+    """Return three numbers as a tuple, and one number, or None, as it is."""
+    return tuple(given) if isinstance(given, Sequence) and not isinstance(given, str) else given
 
 
-def principal(stress: Array) -> Array:
-    """Return the principal stresses (3, ...) of a stress tensor (3, 3, ...), the largest first."""
-    values = np.linalg.eigvalsh(np.moveaxis(stress, (0, 1), (-2, -1)))
-    return np.asarray(np.moveaxis(values[..., ::-1], -1, 0), dtype=np.float64)
-
-
-def outer_principal(stress: Array) -> Array:
-    """Return the largest and the smallest principal stress (2, ...) of a symmetric stress tensor (3, 3, ...).
-
-    They follow from the cosines of the characteristic polynomial's angle: `principal` takes ten times as long. Where
-    two principal stresses are equal, the results are accurate to 1e-8 of the deviator.
-    """
-    mean = (stress[0, 0] + stress[1, 1] + stress[2, 2]) / 3.0
-    xx, yy, zz = (stress[i, i] - mean for i in range(3))
-    xy, xz, yz = stress[0, 1], stress[0, 2], stress[1, 2]
-    size = np.sqrt((xx * xx + yy * yy + zz * zz + 2.0 * (xy * xy + xz * xz + yz * yz)) / 6.0)
-    determinant = xx * (yy * zz - yz * yz) - xy * (xy * zz - yz * xz) + xz * (xy * yz - yy * xz)
-    cube = np.where(size > 0.0, size, 1.0) ** 3
-    angle = np.arccos(np.clip(determinant / (2.0 * cube), -1.0, 1.0)) / 3.0
-    return np.stack([mean + 2.0 * size * np.cos(angle), mean + 2.0 * size * np.cos(angle + 2.0 * np.pi / 3.0)])
-
-
-def _mean_pressure(stress: Array) -> Array:
-    """Return a third of the trace times the unit tensor, (3, 3, ...)."""
-    third = (stress[0, 0] + stress[1, 1] + stress[2, 2]) / 3.0
-    return np.multiply.outer(np.eye(3), third)
+def _of_owners(every: Sequence[Any], owners: Mapping[Owner, None]) -> Iterator[list[Any]]:
+    """Yield the constants of each patch or solid that all dictionaries name; of none, the constants themselves."""
+    if not owners:
+        yield list(every)
+    for who in owners:
+        if all(who in own for own in every if isinstance(own, Mapping)):
+            yield [own[who] if isinstance(own, Mapping) else own for own in every]

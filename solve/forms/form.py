@@ -67,6 +67,28 @@ class Form:
         """Return the term (c, ...) of u and grad that is multiplied by the test function itself; 0 by default."""
         return 0.0
 
+    def initial_flux(self, x: Any) -> Any:
+        """Return the flux (c, 3, ...) of a body at rest, u = 0, at points x (3, ...), such as a thermal stress.
+
+        `flux` is linear beside it: the whole flux is the sum of the two.
+        """
+        raise NotImplementedError(f"{type(self).__name__} has no initial flux")
+
+    @property
+    def has_initial_flux(self) -> bool:
+        """Return whether the law has an initial flux."""
+        return type(self).initial_flux is not Form.initial_flux
+
+    def whole_flux(self, u: Any, grad: Any, x: Any) -> Any:
+        """Return the flux (c, 3, ...) with the initial one; arguments as of `flux`."""
+        found = self.flux(u, grad, x)
+        return found + self.initial_flux(x) if self.has_initial_flux else found
+
+    def energy(self, u: Any, grad: Any, x: Any) -> Any:
+        """Return half of flux : grad u + react . u, (...), whose integral is the energy 1/2 a(u, u) of the body."""
+        inside = (np.asarray(self.flux(u, grad, x)) * grad).sum(axis=(0, 1))
+        return 0.5 * (inside + (reaction(self, u, grad, x) * u).sum(axis=0))
+
     @property
     def caveat(self) -> str:
         """Return why the law takes many iterations and has no error estimate from the residual; "" otherwise."""
@@ -85,10 +107,10 @@ class Form:
         return {
             "u": lambda u, grad, x: u,
             "gradient": lambda u, grad, x: grad,
-            "flux": self.flux,
+            "flux": self.whole_flux,
             "magnitude": lambda u, grad, x: np.sqrt((u * u).sum(axis=0)),
             "gradient_magnitude": lambda u, grad, x: _length(grad),
-            "flux_magnitude": lambda u, grad, x: _length(self.flux(u, grad, x)),
+            "flux_magnitude": lambda u, grad, x: _length(self.whole_flux(u, grad, x)),
         }
 
     @property
@@ -169,7 +191,7 @@ def strong_terms(form: Form, u: Sequence[Jet], x: Array) -> list[list[Number]]:
     ]
     grad, where = as_objects(slopes, (len(u), 3)), as_objects(coordinates(x), (3,))
     with np.errstate(all="ignore"):
-        flux = np.asarray(form.flux(values, grad, where), dtype=object)
+        flux = np.asarray(form.whole_flux(values, grad, where), dtype=object)
         react = np.broadcast_to(np.asarray(form.react(values, grad, where), dtype=object), values.shape)
     if flux.shape != grad.shape:
         raise ValueError(f"flux must return shape {grad.shape} on jets of that shape, got {flux.shape}")

@@ -89,15 +89,7 @@ class Material:
     unit: str = "mm"
 
     def __post_init__(self) -> None:
-        given = [self.young, self.poisson_ratio]
-        if self.shear_modulus is not None:
-            given.append(self.shear_modulus)
-        counts = {len(value) if isinstance(value, tuple) else 1 for value in given}
-        if counts != ({3} if self.shear_modulus is not None else {1}):
-            raise ValueError(
-                f"material {self.name!r}: give one young and one poisson_ratio, or three of young, poisson_ratio and "
-                "shear_modulus each: E1, E2, E3, nu12, nu13, nu23 and G12, G13, G23"
-            )
+        demand_constants(self.young, self.poisson_ratio, self.shear_modulus)
         if self.unit not in UNITS:
             raise ValueError(f"material {self.name!r}: unit must be 'mm' or 'm', got {self.unit!r:.80}")
 
@@ -134,6 +126,17 @@ class Material:
     def units(self) -> str:
         """Return the units of the numbers in one line."""
         return f"{self.unit}, N, " + ", ".join(UNITS[self.unit].values())
+
+
+def demand_constants(young: Constants, poisson_ratio: Constants, shear_modulus: Constants | None) -> None:
+    """Raise ValueError for constants that are neither those of an isotropic nor those of an orthotropic material."""
+    given = [young, poisson_ratio, *([] if shear_modulus is None else [shear_modulus])]
+    counts = {len(value) if isinstance(value, tuple) else 1 for value in given}
+    if counts != ({1} if shear_modulus is None else {3}):
+        raise ValueError(
+            "give one young and one poisson_ratio, or three numbers of young, poisson_ratio and shear_modulus each: "
+            "E1, E2, E3, nu12, nu13, nu23 and G12, G13, G23"
+        )
 
 
 def _times(value: Any, factor: float) -> Any:

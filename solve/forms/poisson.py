@@ -12,8 +12,8 @@ from parameterize.arrays import Array
 
 from ..field import FieldOnBody
 from .conditions import OF_SCALARS, Condition, GivenRegions, OnFaces
-from .data import NOT_SMOOTH, Data, Datum, PerPatch, demand, demand_definite, demand_size
-from .jets import PAIRS, SYMMETRIC, Jet
+from .data import NOT_SMOOTH, Data, PerPatch, demand, demand_definite, demand_size
+from .jets import PAIRS, SYMMETRIC
 from .problem import LawWithData
 
 IDENTITY = (1.0, 0.0, 0.0, 1.0, 0.0, 1.0)  # the six entries
@@ -104,7 +104,7 @@ class Poisson(LawWithData):
         """Return the flux kappa grad u, (1, 3, ...)."""
         if "kappa" not in self.data:
             return grad
-        kappa = _coefficient(self.data["kappa"], x)
+        kappa = self.data["kappa"].at(x)
         if len(kappa) == 1:
             return kappa[0] * grad
         rows = [sum(kappa[SYMMETRIC[i][j]] * grad[:, j] for j in range(3)) for i in range(3)]
@@ -117,7 +117,7 @@ class Poisson(LawWithData):
 
     def react(self, u: Any, grad: Any, x: Any) -> Any:
         """Return the reaction c u, (1, ...)."""
-        return _coefficient(self.data["reaction"], x)[0] * u if self.has_reaction else 0.0
+        return self.data["reaction"].at(x)[0] * u if self.has_reaction else 0.0
 
     @property
     def has_reaction(self) -> bool:
@@ -173,12 +173,3 @@ def _six(kappa: Any) -> Any:
             f"kappa has {len(entries)} entries: give one, the six xx, xy, xz, yy, yz, zz of a symmetric tensor, or nine"
         )
     return entries
-
-
-def _coefficient(datum: Datum, x: Any) -> Any:
-    """Return a coefficient (c, ...) at points, or on jets; on jets, a function's derivatives are not numbers."""
-    if x.dtype != object:
-        return datum(x)
-    if datum.is_formula:
-        return [formula.jet(list(x)) for formula in datum.formulas]
-    return [Jet(value, (np.nan,) * 3, ()) for value in datum(np.stack(np.broadcast_arrays(*(jet.value for jet in x))))]
