@@ -166,10 +166,9 @@ class Elasticity(LawWithData):
         force = NONE if force is None and self.exact is None and is_loaded else force
         given = {"exact": self.exact, "source": force, "temperature_change": self.temperature_change}
         vectors = {role: getattr(self, role) for role in AXES if role not in self._along_parameters}
-        counts = {"temperature_change": 1} | dict.fromkeys(AXES, 3)
         self._assign(data={})
         self._assign(hooke=self._first_hooke())
-        self._set(given | vectors, self.displacement, self.traction, **counts)
+        self._set(given | vectors, self.displacement, self.traction, temperature_change=1, first_axis=3, second_axis=3)
         self._assign(hooke=self._first_hooke())  # along its axes, which are data
 
     def demand_held(self) -> None:
@@ -232,7 +231,7 @@ class Elasticity(LawWithData):
         """Return the law of a patch, or of the first one where several are given. Raises ValueError for any of them."""
         every = [getattr(self, name) for name in CONSTANTS[:-1]]
         owners = {who: None for own in every if isinstance(own, Mapping) for who in own}
-        found = [Hooke(*each, axes=self._fixed_axes) for each in _of_owners(every, owners)]
+        found = [Hooke(*constants, self._fixed_axes) for constants in _of_owners(every, owners)]
         for hooke in found:
             if hooke.shear_modulus is not None and self.first_axis is not None and self.second_axis is None:
                 hooke.demand_the_same_across()
