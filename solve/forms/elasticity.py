@@ -231,7 +231,8 @@ class Elasticity(LawWithData):
         """Return the law of a patch, or of the first one where several are given. Raises ValueError for any of them."""
         every = [getattr(self, name) for name in CONSTANTS[:-1]]
         owners = {who: None for own in every if isinstance(own, Mapping) for who in own}
-        found = [Hooke(*constants, self._fixed_axes) for constants in _of_owners(every, owners)]
+        each = _of_owners(every, owners)
+        found = [Hooke(young, nu, shear, growth, self._fixed_axes) for young, nu, shear, growth in each]
         for hooke in found:
             if hooke.shear_modulus is not None and self.first_axis is not None and self.second_axis is None:
                 hooke.demand_the_same_across()
