@@ -15,14 +15,32 @@ from parameterize.spline.volume import FACE_NAMES
 from .discretization.face_data import FaceRule
 from .discretization.groups import OnPatches
 from .discretization.operator import FaceTerm
+from .discretization.processes import Processes
 from .discretization.space import TrialSpace
 from .discretization.unknowns import Unknowns
 from .discretization.weak import WeakFace
 from .field import part_of
 from .forms.boundary_value_problem import BoundaryValueProblem
 from .patch_system import PatchSystem
+from .resultant import Resultants
 
 CANCELLED = 1e-9  # share of all parts of the forces below which the forces are rounding: each balances itself
+
+
+@dataclass(frozen=True)
+class Moments:
+    """Hold the moments about the origin of the loads (3,), and of the reaction of each support (3,).
+
+    Of a body without patches by rational functions they balance as the forces do; of such ones to the accuracy of the
+    trial space.
+    """
+
+    load: tuple[float, ...]
+    reactions: Mapping[str, tuple[float, ...]]
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the entries of a level in report.json."""
+        return {"load": list(self.load), "reactions": {role: list(own) for role, own in self.reactions.items()}}
 
 
 @dataclass(frozen=True)
@@ -40,6 +58,8 @@ class Balance:
     imbalance : float or None
         The largest component of the sum of load and reactions, over the sum of their sizes: the error of the linear
         solver. None for a law with a reaction, which takes a part of the load inside the body.
+    moments : Moments or None
+        The moments of loads and reactions about the origin; None for a scalar law, and where processes share the body.
 
     Examples
     --------
@@ -55,13 +75,15 @@ class Balance:
     reactions: Mapping[str, tuple[float, ...]]
     areas: Mapping[str, float]
     imbalance: float | None
+    moments: Moments | None = None
 
     def as_dict(self) -> dict[str, Any]:
         """Return the entries of a level in report.json."""
         found: dict[str, Any] = {"load": list(self.load)}
         found["reactions"] = {role: list(force) for role, force in self.reactions.items()}
         found["areas"] = dict(self.areas)
-        return found | ({} if self.imbalance is None else {"imbalance": self.imbalance})
+        found |= {} if self.imbalance is None else {"imbalance": self.imbalance}
+        return found | ({} if self.moments is None else {"moments": self.moments.as_dict()})
 
     @property
     def is_told(self) -> bool:
@@ -91,24 +113,33 @@ def balance(
     faces: the terms on faces of the patches.
     """
     processes, layout, total = unknowns.processes, products.layout, unknowns.processes.total
+    added = Resultants(problem.form.components, _has_moments(problem, processes, faces))
+    places = added.places(patches)
     loads, full = layout.joined([patch.loads for patch in patches]), layout.joined(coefficients)
     residuals = products - loads
-    rows = processes.shared(list(_of_faces(unknowns.patches, patches, unknowns.on_fixed(residuals))))
+    fixed = unknowns.on_fixed(residuals)
+    rows = processes.shared(list(_of_faces(unknowns.patches, patches, fixed, places, added)))
     reactions: dict[str, Array] = {}
     for _, role, force in sorted(chain.from_iterable(rows), key=lambda row: row[0]):
         reactions[role] = reactions.get(role, 0.0) + force
-    own: Any = sum(part.sum(axis=(0, 2, 3, 4)) for part in loads.in_groups)
+    own = added.none
+    for part, place in zip(loads, places, strict=True):
+        own = own + added.of(part, place)
     roles = chain.from_iterable(processes.shared(_supports(problem, patches)))
-    supports = {role: np.zeros(problem.form.components) for role in roles}
+    supports = {role: added.none.copy() for role in roles}
     for face in faces:
         here, on_face = [patches[place].problem for place in face.patches], full.of(face.patches)
         if isinstance(face, WeakFace):
-            own = own - (face.weights * (face.gamma * face.values + face.held_initial)).sum(axis=1)
-            own = own - _add_regions(here[0], face, on_face, supports)
+            own = own - added.of(face.weights * (face.gamma * face.values + face.held_initial), face.x)
+            own = own - _add_regions(here[0], face, on_face, supports, added)
         elif isinstance(face, FaceRule):
             own = own - _add_robin_faces(here, face, on_face, supports)
-    load = total(own)
+    whole = total(own)
     reactions |= {role: total(force) for role, force in supports.items()}
+    components = problem.form.components
+    load, moment = whole[:components], whole[components:]
+    turning = {role: force[components:] for role, force in reactions.items()}
+    reactions = {role: force[:components] for role, force in reactions.items()}
     forces = [load, *reactions.values()]
     size = float(np.abs(forces).sum())
     scale = float(total(np.abs(loads.flat).sum() + np.abs(residuals.flat).sum()))
@@ -122,18 +153,32 @@ def balance(
         for i, condition in enumerate(problem.conditions)
         if not condition.is_strong
     }
-    as_tuples = {role: tuple(np.atleast_1d(force).tolist()) for role, force in reactions.items()}
-    return Balance(tuple(load.tolist()), as_tuples, areas, imbalance)
+    moments = Moments(tuple(moment.tolist()), _as_tuples(turning)) if added.has_moments else None
+    return Balance(tuple(load.tolist()), _as_tuples(reactions), areas, imbalance, moments)
+
+
+def _as_tuples(forces: Mapping[str, Array]) -> dict[str, tuple[float, ...]]:
+    return {role: tuple(np.atleast_1d(force).tolist()) for role, force in forces.items()}
+
+
+def _has_moments(problem: BoundaryValueProblem, processes: Processes, faces: Sequence[FaceTerm]) -> bool:
+    """Return whether moments are added up: of the forces on a body that may turn, which one process has."""
+    turns = len(problem.form.free_motions(np.zeros((3, 1)))) > 0
+    return turns and len(processes.shared(None)) == 1 and not any(isinstance(face, FaceRule) for face in faces)
 
 
 def _of_faces(
-    numbers: Sequence[int], patches: Sequence[PatchSystem], residuals: Sequence[Array]
+    numbers: Sequence[int],
+    patches: Sequence[PatchSystem],
+    residuals: Sequence[Array],
+    places: Sequence[Array | None],
+    added: Resultants,
 ) -> Iterator[tuple[int, str, Array]]:
-    """Yield the reactions of the fixed coefficients on each face: the patch's number, the face or what names it, (c,).
+    """Yield the reactions of the fixed coefficients on each face: the patch's number, the face or what names it, sums.
 
-    numbers: those of the patches in the body.
+    numbers: those of the patches in the body. places: those of the coefficients (3, n_u, n_v, n_w).
     """
-    for number, patch, residual in zip(numbers, patches, residuals, strict=True):
+    for number, patch, residual, place in zip(numbers, patches, residuals, places, strict=True):
         space, fixed = patch.space, np.zeros(residual.shape[1:], dtype=bool)
         for axis, name in ((i // 2, name) for i, name in enumerate(FACE_NAMES) if name in space.dirichlet):
             here = np.zeros_like(fixed)
@@ -141,7 +186,7 @@ def _of_faces(
                 here[tuple((-1 if name[1] == "1" else 0) if a == axis else slice(None) for a in range(3))] = True
             here &= ~fixed
             fixed |= here
-            force = (residual * here)[:, space.own].sum(axis=(1, 2, 3))
+            force = added.of((residual * here)[:, space.own], place)
             support = patch.problem.strong_on(name)
             yield number, patch.problem.prefix + name if support is None or support.name else support.role, force
 
@@ -177,24 +222,28 @@ def _add_robin_faces(
     return np.asarray((given * face.area).sum(axis=(1, 2, 3)))
 
 
-def _add_regions(problem: BoundaryValueProblem, face: WeakFace, coefficients: Array, found: dict[str, Array]) -> Array:
+def _add_regions(
+    problem: BoundaryValueProblem, face: WeakFace, coefficients: Array, found: dict[str, Array], added: Resultants
+) -> Array:
     """Add the reactions of supports on regions, and return the flux of an exchange into a body of u = 0.
 
     coefficients: (k, c, n_u, n_v, n_w), of the patches of the faces.
     """
-    outside, taken = np.zeros(problem.form.components), np.zeros(len(face.weights), dtype=bool)
+    outside, taken = added.none, np.zeros(len(face.weights), dtype=bool)
+    pulls = face.pulls(coefficients) if any(one.is_essential for one in problem.conditions) else None
     for i, condition in enumerate(problem.conditions):
         here = face.holds(i)
-        if condition.is_essential and condition.role in found:
-            found[condition.role] += face.force(coefficients, here & ~taken)
+        if condition.is_essential and condition.role in found and pulls is not None:
+            chosen = np.flatnonzero(here & ~taken)
+            found[condition.role] += added.of(pulls[:, chosen], face.x[:, chosen])
             taken |= here
         elif condition.factor is not None and here.any():
             chosen = np.flatnonzero(here)
             x, weights = part_of(face.x, chosen), face.weights[chosen]
-            free = np.eye(len(outside))[:, :, None] - face.projector[:, :, chosen]
+            free = np.eye(problem.form.components)[:, :, None] - face.projector[:, :, chosen]
             given = condition.flux_at(problem, x, face.normal[:, chosen])
             u = np.einsum("cdm,dm->cm", free, face.traces(coefficients)[0][:, chosen])
             pull = np.einsum("cdm,dm->cm", condition.factors_at(len(u), x, face.normal[:, chosen]), u)
-            found[condition.role] += (weights * np.einsum("cdm,dm->cm", free, given - pull)).sum(axis=1)
-            outside += (weights * np.einsum("cdm,dm->cm", free, given)).sum(axis=1)
+            found[condition.role] += added.of(weights * np.einsum("cdm,dm->cm", free, given - pull), x)
+            outside += added.of(weights * np.einsum("cdm,dm->cm", free, given), x)
     return outside

@@ -39,6 +39,15 @@ def test_forces_have_a_unit_where_those_of_stresses_and_lengths_are_known():
     assert lines(BODY | {"unit": "mm"}) == lines(BODY)
 
 
+def test_moments_are_told_in_newtons_times_lengths():
+    moments = {"load": [0.0, -20.0, 1e-9], "reactions": {"fix 'u0'": [0.0, 20.0, 0.0]}}
+    section = {"unit": "mm", "stress_unit": "MPa", "levels": [LEVEL | {"moments": moments}]}
+    assert lines(section)[-1] == "moments about the origin in N·mm: load (0, -20, 0), fix 'u0' (0, 20, 0)"
+    assert table(section)[-3] == ["Moment about the origin, load [N·mm]", "0", "-20", "0"]
+    assert "in MPa·m³" in lines(section | {"unit": "m"})[-1]
+    assert lines(BODY | {"levels": section["levels"]})[-1].startswith("moments about the origin: load (0, -20, 0)")
+
+
 def test_of_a_scalar_law_what_flows_in_is_told():
     heat = {"unit": "mm", "levels": [{"load": [3.0], "reactions": {"value 'u0'": [-3.0]}}]}
     assert lines(heat) == ["load 3", "value 'u0' answers -3"] and heading(heat) == "What flows into the body"

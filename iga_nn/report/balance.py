@@ -33,6 +33,8 @@ def table(section: dict[str, Any]) -> list[list[str]]:
     head = [f"{axis}{unit and f' [{unit}]'}" for axis in AXES] if _is_force(section) else ["inflow"]
     rows = [("load", level["load"]), *_reactions(level).items()]
     shown = [["", *head], *([capitalized(role), *_numbers(values, level)] for role, values in rows)]
+    of = unit and f" [{moment_unit_of(section)}]"
+    shown += [[f"Moment about the origin, {role}{of}", *numbers] for role, numbers in _moments(level)]
     if "imbalance" in level:
         shown.append(["Imbalance, relative", f"{level['imbalance']:.1e}", *[""] * (len(head) - 1)])
     return shown
@@ -45,7 +47,10 @@ def lines(section: dict[str, Any]) -> list[str]:
         return []
     unit = unit_of(section)
     rows = [("load", level["load"]), *((f"{role} answers", force) for role, force in _reactions(level).items())]
-    return [f"{said} {_vector(_numbers(values, level))}{unit and f' {unit}'}" for said, values in rows]
+    found = [f"{said} {_vector(_numbers(values, level))}{unit and f' {unit}'}" for said, values in rows]
+    turning = [f"{role} {_vector(numbers)}" for role, numbers in _moments(level)]
+    of = unit and f" in {moment_unit_of(section)}"
+    return found + ([f"moments about the origin{of}: {', '.join(turning)}"] if turning else [])
 
 
 def _finest(section: dict[str, Any]) -> dict[str, Any]:
@@ -73,6 +78,21 @@ def unit_of(section: dict[str, Any]) -> str:
     if (stress, length) in NEWTON:
         return "N"
     return f"{stress}·{length}²" if stress and length else ""
+
+
+def moment_unit_of(section: dict[str, Any]) -> str:
+    """Return the unit of moments, where the units of stresses and of lengths are known."""
+    unit, length = unit_of(section), section.get("unit")
+    return f"N·{length}" if unit == "N" else f"{section['stress_unit']}·{length}³" if unit else ""
+
+
+def _moments(level: dict[str, Any]) -> list[tuple[str, list[str]]]:
+    """Return the moments of the load and of each support as text; none where the level lacks them."""
+    known = level.get("moments")
+    if not known:
+        return []
+    rows = [("load", known["load"]), *_reactions(known).items()]
+    return [(role, _numbers(values, known)) for role, values in rows]
 
 
 def _numbers(values: list[float], level: dict[str, Any]) -> list[str]:

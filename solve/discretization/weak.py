@@ -246,8 +246,8 @@ class WeakFace:
         """Return the values (c, m) of coefficients (k, c, n_u, n_v, n_w)."""
         return np.asarray((self.tables[0] @ self._layer(coefficients, self.layers[0])).T)
 
-    def force(self, coefficients: Array, points: Any) -> Array:
-        """Return the reaction that holds u at some of the points: the integral (c,) of P t - gamma P (u - g).
+    def pulls(self, coefficients: Array) -> Array:
+        """Return the reactions (c, m) that hold u at the points: P t - gamma P (u - g), with the weights.
 
         Summed over all points, with loads and sources, it is zero to the accuracy of the linear solver, as constant
         test functions show.
@@ -255,12 +255,12 @@ class WeakFace:
         u, flux = self.traces(coefficients)
         pull = self.gamma * (np.einsum("cdm,dm->cm", self.projector, u) - self.values)
         density = np.einsum("cdm,dm->cm", self.projector, flux + self.initial) - pull
-        return np.asarray((self.weights * density)[:, points].sum(axis=1))
+        return np.asarray(self.weights * density)
 
     def add_force(self, direction: Array, points: Mask, result: Array) -> None:
-        """Add the part that depends on u of `force` along a direction (c,), of each function, to (k, c, n_u, n_v, n_w).
+        """Add the part that depends on u of a sum of `pulls` along a direction (c,) to (k, c, n_u, n_v, n_w).
 
-        points: (m,), the mask of those whose reaction is meant.
+        It is that of each function. points: (m,), the mask of those whose reaction is meant.
         """
         along = np.einsum("cdm,d->cm", self.held * points, direction)
         self._spread(-self.gamma * along, along, result)
