@@ -13,7 +13,7 @@ from parameterize.arrays import Array, in_brackets
 from parameterize.spline.volume import FACE_NAMES
 
 from .discretization.face_data import FaceRule
-from .discretization.groups import OnPatches
+from .discretization.groups import CoefficientLayout, OnPatches
 from .discretization.operator import FaceTerm
 from .discretization.processes import Processes
 from .discretization.space import TrialSpace
@@ -31,8 +31,8 @@ CANCELLED = 1e-9  # share of all parts of the forces below which the forces are 
 class Moments:
     """Hold the moments about the origin of the loads (3,), and of the reaction of each support (3,).
 
-    Of a body without patches by rational functions they balance as the forces do; of such ones to the accuracy of the
-    trial space.
+    They balance as the forces do, but for bodies whose maps are rational, or of a degree above that of the trial
+    space: there they balance to the accuracy of the solution.
     """
 
     load: tuple[float, ...]
@@ -130,7 +130,8 @@ def balance(
     for face in faces:
         here, on_face = [patches[place].problem for place in face.patches], full.of(face.patches)
         if isinstance(face, WeakFace):
-            own = own - added.of(face.weights * (face.gamma * face.values + face.held_initial), face.x)
+            own = own + _given(face, layout, places, added)
+            own = own - _add_regions(here[0], face, on_face, supports, added)
             own = own - _add_regions(here[0], face, on_face, supports, added)
         elif isinstance(face, FaceRule):
             own = own - _add_robin_faces(here, face, on_face, supports)
@@ -197,6 +198,19 @@ def _has_end(space: TrialSpace, name: str) -> bool:
     if rows.start == rows.stop:
         return False
     return bool(rows.stop == space.whole.shape[0] if name == "u1" else rows.start == 0)
+
+
+def _given(face: WeakFace, layout: CoefficientLayout, places: Sequence[Array | None], added: Resultants) -> Array:
+    """Return the given fluxes of a face at its points, minus its part of the loads of coefficients.
+
+    That part has the terms of given values, too, and its moments are those of the trial space.
+    """
+    on_patches = np.zeros((len(face.patches), face.form.components, *layout.shapes[face.patches[0]]))
+    face.add_load(on_patches)
+    found = added.of(face.weights * face.loads, face.x)
+    for number, own in zip(face.patches, on_patches, strict=True):
+        found = found - added.of(own, places[number])
+    return found
 
 
 def _supports(problem: BoundaryValueProblem, patches: Sequence[PatchSystem]) -> list[str]:
