@@ -1,5 +1,6 @@
 """Ranges of colours, of fields with a peak as well."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -7,35 +8,54 @@ import pytest
 from matplotlib.figure import Figure
 
 import iga_nn
-from iga_nn.figures.colors import even_range, joint_range, range_up_to
+from iga_nn.figures.colors import even_range, joint_range, range_of_most
 from iga_nn.figures.fields import fields_of
 from iga_nn.figures.style import color_bar
 from iga_nn.report.viewer import scene_of
 from parameterize.spline.volume import BSplineVolume
 
-VALUES = [np.array([0.0, 1.0, 2.0]), np.array([9.0])]
+PEAK = [np.concatenate([np.linspace(0.0, 1.0, 1000), [9.0]])]
+EVEN = [np.linspace(0.0, 1.0, 1000)]
+
+
+def most(values, **how):
+    return range_of_most(values, np.ones_like(values[-1]), **how)
 
 
 def test_a_range_without_its_peak():
-    shown = range_up_to(2.0, VALUES)
-    assert (shown.low, shown.high, shown.beyond) == (0.0, 2.0, 9.0)
-    assert shown.whole == even_range(VALUES)
-    np.testing.assert_allclose(shown.shares(np.array([0.0, 1.0, 9.0])), [0.0, 0.5, 1.0])
-    for high in (-1.0, 9.0, 12.0):
-        assert range_up_to(high, VALUES) == even_range(VALUES)
+    shown = most(PEAK)
+    assert (shown.low, shown.beyond, shown.below) == (0.0, 9.0, None) and shown.high == pytest.approx(0.995, abs=2e-3)
+    assert shown.whole == even_range(PEAK) and most(EVEN) == even_range(EVEN)
+    np.testing.assert_allclose(shown.shares(np.array([0.0, 0.5 * shown.high, 9.0])), [0.0, 0.5, 1.0])
+    sunk = most([-PEAK[0]])
+    assert (sunk.high, sunk.below, sunk.beyond) == (0.0, -9.0, None)
+
+
+def test_volumes_weigh_and_singular_samples_do_not_count():
+    heavy = range_of_most(PEAK, np.where(PEAK[0] == 9.0, 1000.0, 1.0))
+    assert not heavy.is_part
+    near = np.linspace(0.0, 9.0, 100)
+    assert most([near], counted=near < 3.0).high == pytest.approx(3.0, abs=0.1)
+
+
+def test_the_legend_says_the_share_and_the_peak_with_units():
+    shown = replace(most(PEAK), places=((1e-17, 2.0, 3.0), None), without=True)
+    assert shown.said("MPa", "mm") == "99 % of the body away from singular places; largest 9 MPa at (0, 2, 3) mm"
+    assert most(EVEN).said("MPa") == ""
 
 
 def test_fields_of_several_frames_have_one_range():
-    assert joint_range([even_range(VALUES)], VALUES) == even_range(VALUES)
-    assert joint_range([range_up_to(1.0, VALUES), range_up_to(2.0, VALUES)], VALUES) == range_up_to(2.0, VALUES)
+    assert joint_range([even_range(EVEN)], EVEN) == even_range(EVEN)
+    joint = joint_range([most(PEAK), most(EVEN)], PEAK + EVEN)
+    assert (joint.high, joint.beyond) == (1.0, 9.0)
 
 
 def test_an_arrow_at_the_bar_says_that_values_lie_beyond():
-    for limits, extend in ((even_range(VALUES), "neither"), (range_up_to(2.0, VALUES), "max")):
+    for limits, extend in ((even_range(EVEN), "neither"), (most(PEAK), "max"), (most([-PEAK[0]]), "min")):
         figure = Figure()
-        color_bar(figure, figure.subplots(), limits, "stress")
+        color_bar(figure, figure.subplots(), limits, "stress", limits.said())
         assert figure.axes[-1]._colorbar.extend == extend
-        assert ("up to 9" in figure.axes[-1].get_ylabel()) == (extend == "max")
+        assert ("99 % of the body" in figure.get_supxlabel()) == limits.is_part
 
 
 @pytest.mark.parametrize("support", ["fix", "roller"])
@@ -47,7 +67,8 @@ def test_stress_is_coloured_as_it_is_outside_of_singular_places(support):
     limits = fields_of(solution)[0].limits
     scene = SimpleNamespace(**scene_of(beam, solution)["fields"][0])
     if support == "roller":
-        assert limits.beyond is None and scene.shown == scene.high
+        assert not limits.is_part and scene.shown == [scene.low, scene.high] and scene.said == ""
     else:
         assert limits.high < limits.beyond == scene.high
-        assert scene.shown == limits.high == pytest.approx(1.0, abs=0.05)
+        assert scene.shown[1] == limits.high == pytest.approx(1.0, abs=0.05)
+        assert scene.said.startswith("99 % of the body away from singular places; largest")

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from bodies import ring
+from bodies import hollow, ring
 from matplotlib.colors import rgb_to_hsv
 from mesh_files import CUBE, TRIANGLES
 
 import iga_nn
 from iga_nn.figures import regions as figures
 from iga_nn.figures import render
+from iga_nn.figures.first_view import best_sides
 from parameterize.surface.surface import surface_from_arrays
 
 
@@ -18,12 +19,14 @@ from parameterize.surface.surface import surface_from_arrays
 def drawn(monkeypatch):
     """The patches that would be drawn, from the front and from behind."""
     found = []
-    monkeypatch.setattr(figures, "show_around", lambda panels, patches, unit=None: found.append(patches))
+    monkeypatch.setattr(figures, "show_around", lambda panels, patches, **_: found.append(patches))
+    monkeypatch.setattr(figures, "show", lambda panel, title, patches, view: found.append(patches))
     return found
 
 
 def legend(figure):
-    return [text.get_text() for text in figure.legends[0].get_texts()]
+    found = figure.legends or [panel.get_legend() for panel in figure.axes]
+    return [text.get_text() for one in found for text in one.get_texts()]
 
 
 def shares(patches, palette):
@@ -37,9 +40,9 @@ def test_conditions_on_a_solid_have_their_shares_of_its_faces(drawn):
     body = iga_nn.Elasticity(fix="u0", load={"nz > 0.9 and x > 0.75": ("0", "0", "-1"), "nz > 0.9": ("0", "0", "1")})
     figure = figures.draw_conditions(None, iga_nn.BSplineVolume.uniform(grid), body.conditions)
     assert legend(figure) == ["fix: u0", "load: nz > 0.9 and x > 0.75", "load: nz > 0.9"]
-    found = shares(drawn[0], figures._palette(3))
+    found = shares(drawn[0][:1], figures.region_colors(3))
     np.testing.assert_allclose(found, [1 / 6, 1 / 24, 3 / 24, 4 / 6], atol=2e-3)
-    assert np.all(drawn[0][0].colors[0] == figures._palette(3)[0])  # u0 is the first face
+    assert np.all(drawn[0][0].colors[0] == figures.region_colors(3)[0])  # u0 is the first face
 
 
 def test_conditions_on_blocks_know_their_own_faces(drawn):
@@ -47,7 +50,7 @@ def test_conditions_on_blocks_know_their_own_faces(drawn):
     body = ring(4)
     held = iga_nn.Elasticity(fix="p2_v1", load={"w1": (0, 0, 1)}, pressure={"nz < -0.9": 1})
     figures.draw_conditions(None, body, held.conditions)
-    (patch,), palette = drawn[0], figures._palette(3)
+    (patch, _), palette = drawn[0], figures.region_colors(3)
     found = {"rest": set(), "fix": set(), "load": set(), "pressure": set()}
     for (owner, name), colors in zip(body.outer_faces, patch.colors, strict=True):
         for kind, color in zip(("fix", "load", "pressure", "rest"), palette, strict=True):
@@ -64,15 +67,25 @@ def test_regions_on_a_surface_end_within_triangles(drawn):
     assert legend(figure) == ["nz > 0.9", "x < 0.25", "y < 0.5"]
     points = np.concatenate([patch.points.reshape(-1, 3) for patch in drawn[0]])
     colors = np.concatenate([patch.colors.reshape(-1, 3) for patch in drawn[0]])
-    palette = figures._palette(3)
+    palette = figures.region_colors(3)
     rest = points[np.all(colors == palette[-1], axis=1)]
     assert rest[:, 0].min() >= 0.25 and rest[:, 1].min() >= 0.5 and rest[:, 1].max() == 1.0
     first = points[np.all(colors == palette[0], axis=1)]
     assert np.ptp(first, axis=0).tolist() == [1.0, 1.0, 0.0] and np.all(first[:, 2] == 1.0)
 
 
+def test_each_region_is_seen_from_its_own_side_and_a_hidden_one_through_the_rest(drawn):
+    """Of a hollow cube one side is held, and the cavity has a pressure."""
+    body = hollow()
+    held = iga_nn.Elasticity(fix="nx > 0.9 and x > 1", pressure={"box(-0.6, -0.6, -0.6, 0.6, 0.6, 0.6)": 1})
+    sides = best_sides(body, held.conditions)
+    assert [seen for _, seen in sides] == [True, False] and sides[0][0].towards[0] > 0.5
+    figures.draw_conditions(None, body, held.conditions)
+    assert [patch.opacity for patch in drawn[1]] == [1.0, figures.GLASS, 1.0]
+
+
 def test_more_regions_than_colours_repeat_them():
-    assert np.array_equal(figures._palette(11)[0], figures._palette(11)[10])
+    assert np.array_equal(figures.region_colors(11)[0], figures.region_colors(11)[10])
 
 
 @pytest.mark.pictures

@@ -16,7 +16,8 @@ from parameterize.spline.orientation import orientation
 from parameterize.spline.volume import AXES, FACE_NAMES
 
 from .colors import face_colors
-from .fields import ColoredField, Samples, outer_faces
+from .fields import PER_PATCH, ColoredField, Samples, outer_faces
+from .outline import is_by_face, smooth_colors
 from .render import TILT, Patch, View, widest_view
 
 Octant = tuple[int, int, int]  # its corner of the cube: the sides, 0 or 1, of u, of v and of w
@@ -52,23 +53,30 @@ class Painted:
 
 
 def own_colors(body: BodyLike) -> Array:
-    """Return the colours (9 patches, 3) of the images of each patch's six faces, and of u, v and w = 1/2, in one."""
+    """Return the colours (9 patches, 3) of the images of each patch's six faces, and of u, v and w = 1/2, in one.
+
+    Of very many patches the outer faces have a colour between sharp edges, and all inside is light.
+    """
+    if is_by_face(body):
+        found = np.tile(to_rgba_array(INSIDE)[:, :3], (PER_PATCH * len(as_body(body)), 1))
+        found[outer_faces(body)] = to_rgba_array(smooth_colors(body))[:, :3]
+        return found
     faces = np.reshape(face_colors(body), (-1, len(FACE_NAMES)))
     named = np.concatenate([faces, np.full((len(faces), len(AXES)), INSIDE)], axis=1)
     return to_rgba_array(named.ravel())[:, :3]
 
 
-def cut_of(body: BodyLike, drawn: Samples, points: Samples) -> tuple[Mask, View]:
+def cut_of(body: BodyLike, drawn: Samples, points: Samples, view: View | None = None) -> tuple[Mask, View]:
     """Return the octants (patches, 2, 2, 2) that are left out, and the view that shows most of the cut.
 
     drawn: the points as they are drawn. points: those of the body at rest. Of several patches the octants are left out
-    that lie in the upper half and towards the viewer.
+    that lie in the upper half and towards the viewer. view: the one to take for several patches, by default the widest.
     """
     glued, outer = as_body(body), drawn.on(outer_faces(body))
     if glued.is_single:
-        octant, view = best_cut(outer, orientation(glued.only))
-        return only(octant), view
-    view = widest_view(outer.reshape(-1, 3), TILT)
+        octant, best = best_cut(outer, orientation(glued.only))
+        return only(octant), best
+    view = view or widest_view(outer.reshape(-1, 3), TILT)
     return beyond(points, view.towards) & beyond(points, view.up), view
 
 

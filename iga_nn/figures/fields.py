@@ -1,8 +1,8 @@
 """Samples bodies and their fields once for all pictures: on the faces, mid-sections and a lattice of each patch.
 
 Figures and the interactive view colour a field by one range, which counts every sample: on the boundary, on the
-mid-sections and inside. Whatever is drawn is among the samples, so no value that is drawn lies outside. Only a stress
-that is infinite somewhere is coloured by the range of its values elsewhere.
+mid-sections and inside. Whatever is drawn is among the samples. Where peaks would take most of the colours, the range
+is that of 99 % of the body, outside of the places where a stress is infinite; legends say so.
 
 Where something is listed for the faces and sections of all patches, each patch has nine entries: six faces, in the
 order of FACE_NAMES, three sections. Their number among those of all patches is their place: nine times the number of
@@ -37,7 +37,7 @@ from solve.quantities import group_values
 from solve.singular import SingularPlaces
 
 from ..options import Units
-from .colors import SMALLEST, ColorRange, error_range, even_range, range_up_to, with_unit
+from .colors import SMALLEST, ColorRange, error_range, even_range, range_of_most, with_unit
 
 Grid = tuple[Array, Array, Array]  # parameters of a tensor grid; on a face or a section one direction has one value
 OnGrid = Callable[[IntArray, Array, Array, Array], Array]  # takes some patches of a group and a tensor grid
@@ -57,6 +57,7 @@ LINED = 10_000  # patches: of more, borders would cover the colours
 NAMED = 300  # outer faces whose names can be read in a picture
 KEPT = 2  # results of one function
 
+DISTORTION = "distortion"  # the name of a field that has no unit
 STRESS = "von Mises"  # the name of the field that a body is drawn in
 SHARE = 0.08  # of the diagonal of the body's box: the largest displacement as drawn
 DIGITS = (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0)  # first digits of a factor; each is at most 1.5 times the one before
@@ -151,7 +152,15 @@ class ColoredField(Samples):
 
     def titled(self, units: Units) -> str:
         """Return the title with the unit of the field."""
-        return with_unit(self.title, units.stress if self.name == STRESS else units.displacement)
+        return with_unit(self.title, self.unit(units))
+
+    def unit(self, units: Units) -> str | None:
+        """Return the unit of the values, None where it is not known."""
+        return units.stress if self.name == STRESS else None if self.name == DISTORTION else units.displacement
+
+    def said(self, units: Units) -> str:
+        """Return what the range of the colours is, "" where it is that of all values."""
+        return self.limits.said(self.unit(units), units.displacement)
 
     @classmethod
     def ranging(cls, samples: Samples, name: str, title: str) -> Self:
@@ -267,7 +276,7 @@ def distortion_of(body: BodyLike) -> ColoredField:
     """Return tanh(sqrt(ARAP) / 2), as the paper colours it, at volume 1; of several patches, each in its own box."""
     shares = sampled(body, arap_of(body)).each(lambda arap: np.tanh(np.sqrt(arap) / 2.0))
     title = f"tanh(√ARAP / 2), {'at volume 1' if as_body(body).is_single else 'each in its own box'}"
-    return ColoredField(shares.places, shares.planes, shares.lattices, "distortion", title, ColorRange(0.0, 1.0))
+    return ColoredField(shares.places, shares.planes, shares.lattices, DISTORTION, title, ColorRange(0.0, 1.0))
 
 
 @remembered
@@ -342,23 +351,47 @@ def fields_of(solution: FieldOnBody) -> list[ColoredField]:
     laws = [group.problem.form.quantities.get("von_mises") for group in known_groups(solution) if group.problem]
     if laws and None not in laws:
         stress = quantity_of(solution, [law for law in laws if law], STRESS, "von Mises stress")
-        return fields if stress is None else [_ranging_outside(solution, stress), *fields]
-    return fields
+        fields = fields if stress is None else [stress, *fields]
+    return [_ranging(solution, field) for field in fields]
 
 
-def _ranging_outside(solution: FieldOnBody, field: ColoredField) -> ColoredField:
-    """Return a field of stresses with the range of those outside of singular places, as far as samples lie there."""
+def _ranging(solution: FieldOnBody, field: ColoredField) -> ColoredField:
+    """Return a field with the range of most of the body, outside of singular places as far as samples lie there.
+
+    The range knows the places of the largest and the least value, if these lie outside of it.
+    """
     places: SingularPlaces = getattr(solution, "singular", SingularPlaces())
-    if not len(places):
-        return field
-    points = points_of(solution.on_body).everywhere
-    for spans in RADII:
-        outside = [~places.is_near(at.reshape(-1, 3), spans).reshape(at.shape[:-1]) for at in points]
-        rest = [values[mask] for values, mask in zip(field.everywhere, outside, strict=True) if mask.any()]
-        if rest:
-            high = max(float(values.max()) for values in rest)
-            return replace(field, limits=range_up_to(high, field.everywhere))
-    return field
+    body = solution.on_body
+    lattices, counted = points_of(body).lattices, None
+    for spans in RADII if len(places) else ():
+        outside = ~places.is_near(lattices.reshape(-1, 3), spans).reshape(lattices.shape[:-1])
+        if outside.any():
+            counted = outside
+            break
+    limits = range_of_most(field.everywhere, volumes_of(body), counted=counted)
+    if limits.is_part:
+        limits = replace(limits, places=_places(field, body), without=counted is not None)
+    return replace(field, limits=limits)
+
+
+def _places(field: ColoredField, body: BodyLike) -> tuple[list[float], list[float]]:
+    """Return the places of the largest and of the least value of a field."""
+    pairs = list(zip(field.everywhere, points_of(body).everywhere, strict=True))
+    largest = max(pairs, key=lambda pair: float(pair[0].max()))
+    least = min(pairs, key=lambda pair: float(pair[0].min()))
+    ends = (largest[0].argmax(), largest[1]), (least[0].argmin(), least[1])
+    at, last = (points.reshape(-1, 3)[number].tolist() for number, points in ends)
+    return at, last
+
+
+@remembered
+def volumes_of(body: BodyLike) -> Array:
+    """Return the volume (patches, n, n, n) that each sample of the lattices stands for, over its cell's."""
+    points = points_of(body).lattices
+    slopes = np.stack([np.gradient(points, axis=1 + axis) for axis in range(3)], axis=-1)
+    ends = np.ones(points.shape[1])
+    ends[[0, -1]] = 0.5
+    return np.asarray(np.abs(np.linalg.det(slopes)) * np.einsum("i,j,k->ijk", ends, ends, ends))
 
 
 known_groups = remembered(groups_of)

@@ -12,6 +12,7 @@ from parameterize.certificate.boundary import Meeting
 from parameterize.spline.body import Body, BodyLike, as_body
 from parameterize.spline.volume import FACE_NAMES
 
+from .colors import MOST_NAMED, ColorRange
 from .cutaway import INSIDE, Painted, cut_of, octant_label, own_colors, visible
 from .fields import (
     NAMED,
@@ -117,7 +118,13 @@ def draw_distortion(path: str | Path | None, body: BodyLike) -> Figure:
 
 
 def draw_blocks(path: str | Path | None, body: Body) -> Figure:
-    """Draw the blocks apart, each in its colour and with light glued faces, and the interfaces in the glass body."""
+    """Draw the blocks apart, each in its colour and with light glued faces, and the interfaces in the glass body.
+
+    Of more than MOST_NAMED blocks the colours say how much each is distorted, and the body is cut open in place of the
+    interfaces.
+    """
+    if len(body) > MOST_NAMED:
+        return _draw_many(path, body)
     places = np.flatnonzero(np.arange(PER_PATCH * len(body)) % PER_PATCH < len(FACE_NAMES))
     outer, colors, moved = outer_faces(body), own_colors(body), _apart(points_of(body))
     glued = np.setdiff1d(places, outer)
@@ -131,6 +138,20 @@ def draw_blocks(path: str | Path | None, body: Body) -> Figure:
     count = len(body.interfaces)
     joints = f"{count} interface" + ("s" if count != 1 else "")
     return save(figure, path, f"{len(body)} blocks, {joints}; glued faces are light")
+
+
+def _draw_many(path: str | Path | None, body: Body) -> Figure:
+    """Draw many blocks, whole and cut open, in colours of the mean distortion of each."""
+    field, points = distortion_of(body), points_of(body)
+    means = field.lattices.mean(axis=(1, 2, 3))
+    limits = ColorRange(float(means.min()), float(means.max())) if np.ptp(means) > 0.0 else field.limits
+    painted = Painted(points, np.repeat(limits.colors(means), PER_PATCH, axis=0), lines_of(body, 1))
+    left_out, view = cut_of(body, points, points)
+    figure, (panels,) = panels_of(1, 2)
+    show(panels[0], "the blocks", painted.at(outer_faces(body)), view)
+    show(panels[1], "cut open", visible(body, painted, left_out), view)
+    color_bar(figure, panels, limits, f"mean of {field.title}")
+    return save(figure, path, f"{len(body):,} blocks, {len(body.interfaces):,} interfaces")
 
 
 def _apart(points: Samples) -> Samples:

@@ -21,6 +21,7 @@ from .probe import choose_window
 
 log = logging.getLogger(__name__)
 
+LARGER = 1.1  # times the box of principal axes
 TILT = 0.45  # radians: shows more than one side of a solid
 LINE_WIDTH = 1.6  # pixels
 NEARER_LINES, NEARER_MARKS = 0.003, 0.01  # of the scene's size, towards the viewer: keeps them before a surface
@@ -87,16 +88,27 @@ def widest_view(points: Array, tilt: float = 0.0) -> View:
 
     tilt: radians that the viewer is moved up and sideways, so that a solid shows more than one side.
     """
-    centred = points - points.mean(axis=0)
-    _, _, axes = np.linalg.svd(centred.T @ centred)
-    right, up = axes[0], axes[1]
-    right = right * np.sign(right[np.argmax(np.abs(right))])  # the sign of a principal axis is arbitrary: fix it
-    up = up * np.sign(up[np.argmax(np.abs(up))])
-    towards = np.cross(right, up)
+    right, up, towards = longest_first(points)
     towards = np.cos(tilt) * towards + np.sin(tilt) * (0.8 * up + 0.6 * right)
     right = np.cross(up, towards)
     right /= np.linalg.norm(right)
     return View(right, np.cross(towards, right), towards)
+
+
+def longest_first(points: Array) -> Array:
+    """Return the axes (3, 3) of a point cloud (k, 3), right-handed, from its longest side to its thinnest.
+
+    They are principal axes, or x, y and z where these enclose the cloud in a box that is hardly larger.
+    """
+    centred = points - points.mean(axis=0)
+    _, _, axes = np.linalg.svd(centred.T @ centred)
+    sides = np.ptp(points, axis=0)
+    if sides.prod() <= LARGER * np.ptp(centred @ axes.T, axis=0).prod():
+        axes = np.eye(3)[np.argsort(-np.round(sides / (sides.max() or 1.0), 3), kind="stable")]
+    right, up = axes[0], axes[1]
+    right = right * np.sign(right[np.argmax(np.abs(right))])  # the sign of a principal axis is arbitrary: fix it
+    up = up * np.sign(up[np.argmax(np.abs(up))])
+    return np.stack([right, up, np.cross(right, up)])
 
 
 def plain_patch(points: Array, color: str, **look: Any) -> Patch:

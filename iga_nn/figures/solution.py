@@ -32,11 +32,14 @@ from .fields import (
     vectors_on,
     warp_of,
 )
-from .render import TILT, Patch, check_drawable, widest_view
+from .first_view import shown_from
+from .outline import edge_patch, outline_of
+from .render import TILT, Patch, View, check_drawable, widest_view
 from .style import color_bar, panels_of, save, show, show_around, show_inside
 
 MOST, COLUMNS = 6, 3  # modes
 MODE_SAMPLES = 61  # a direction of a face
+BORDERED = 150  # patches: the borders of more would cover the colours, and sharp edges are drawn
 SWING = 0.15  # of the body's size: the largest displacement of a mode as drawn
 
 
@@ -54,7 +57,7 @@ def draw_error(
     field, points = error_of(body, solution, problem), points_of(body)
     figure, rows = panels_of(2, 3)
     painted = Painted(points, field, lines_of(body, 1))
-    show_around(rows[0][:2], painted.at(outer_faces(body)))
+    show_around(rows[0][:2], painted.at(outer_faces(body)), view=shown_from(body, solution))
     _write_numbers(rows[0][2], solution)
     show_inside(rows[1], body, points, painted)
     color_bar(figure, rows, field.limits, with_unit(r"$|u - u_h|$", units.displacement))
@@ -68,14 +71,13 @@ def draw_solution(path: str | Path | None, body: BodyLike, solution: FieldOnBody
     An elastic body is drawn as its displacements deform it, enlarged by a factor that the title states.
     """
     field, points = fields_of(solution)[0], points_of(body)
-    label = field.titled(units)
     if not (factor := warp_of(solution, points.diagonal)):
-        return _draw_values(path, body, points, field, label)
+        return _draw_values(path, body, points, field, units, view=shown_from(body, solution))
     largest = max(float(values.max()) for values in solution_of(solution).everywhere)
     most = with_unit(f"at most {largest:.3g}", units.displacement)
     title = f"The deformed body: displacements, {most}, are drawn {factor_in_words(factor)} times as large"
     moved = moved_by(points, solution, factor)
-    return _draw_values(path, body, moved, field, label, title)
+    return _draw_values(path, body, moved, field, units, title, shown_from(body, solution))
 
 
 def draw_values(
@@ -92,7 +94,7 @@ def draw_values(
     """
     points = points_of(body)
     moved = points if exaggerate is None else moved_by(points, solution, exaggerate)
-    return _draw_values(path, body, moved, solution_of(solution), title)
+    return _draw_values(path, body, moved, replace(solution_of(solution), title=title), NO_UNITS)
 
 
 def moved_by(points: Samples, solution: FieldOnBody, factor: float) -> Samples:
@@ -102,20 +104,29 @@ def moved_by(points: Samples, solution: FieldOnBody, factor: float) -> Samples:
 
 
 def _draw_values(
-    path: str | Path | None, body: BodyLike, points: Samples, field: ColoredField, label: str, heading: str = ""
+    path: str | Path | None,
+    body: BodyLike,
+    points: Samples,
+    field: ColoredField,
+    units: Units,
+    heading: str = "",
+    view: View | None = None,
 ) -> Figure:
     """Draw a field on the faces and sections of all patches at points.
 
-    label: of the colour bar. heading: of the figure.
+    units: those of the colour bar. heading: of the figure. view: from the front; by default the widest one.
     """
-    painted, at_rest = Painted(points, field, lines_of(body, 1)), points_of(body)  # lines along the borders
+    are_few, at_rest = len(as_body(body)) <= BORDERED, points_of(body)
+    painted = Painted(points, field, lines_of(body, 1) if are_few else 0)  # lines along the borders
+    outside = points.on(outer_faces(body))
+    edges = [] if are_few else [edge_patch(outside.reshape(-1, 3), outline_of(body).edges)]
     figure, rows = panels_of(2, 3)
-    show_around(rows[0][:2], painted.at(outer_faces(body)))
-    left_out, view = cut_of(body, points, at_rest)
-    halved = replace(painted, lines=lines_of(body, 2))  # lines along the cut, too
+    show_around(rows[0][:2], [*painted.at(outer_faces(body)), *edges], view=view)
+    left_out, view = cut_of(body, points, at_rest, view)
+    halved = replace(painted, lines=lines_of(body, 2) if are_few else 0)  # lines along the cut, too
     show(rows[0][2], "cut open", visible(body, halved, left_out), view)
     show_inside(rows[1], body, at_rest, painted)
-    color_bar(figure, rows, field.limits, label)
+    color_bar(figure, rows, field.limits, field.titled(units), field.said(units))
     return save(figure, path, heading)
 
 

@@ -21,6 +21,7 @@ from parameterize.spline.volume import FACE_NAMES
 from .colors import MAP, ColorRange, color_labels
 from .cutaway import Painted, beyond, visible
 from .fields import SECTIONS, Samples
+from .outline import is_by_face
 from .render import NAMELESS, Patch, View, draw, view_of, widest_view
 
 PANEL = (720, 560)  # pixels of one view
@@ -73,9 +74,13 @@ def show_around(
     marks: Array | None = None,
     names: Mapping[str, Array] = NAMELESS,
     unit: str | None = None,
+    view: View | None = None,
 ) -> None:
-    """Draw the same patches from the front and from behind on two panels. marks, names, unit: as in `draw`."""
-    view = view_of(patches)
+    """Draw the same patches from the front and from behind on two panels. marks, names, unit: as in `draw`.
+
+    view: from the front; by default the widest one.
+    """
+    view = view or view_of(patches)
     for panel, title, direction in zip(panels, ("front", "back"), (view, view.turned()), strict=True):
         show(panel, title, patches, direction, marks, names, unit)
 
@@ -109,6 +114,8 @@ def _alignment(direction: Array) -> View:
 def name_colors(figure: Figure, body: BodyLike) -> None:
     """Write the legend of the colours of a volume's faces, or of several patches, below the panels."""
     swatches = [Swatch(color=color, label=label) for color, label in color_labels(body)]
+    if is_by_face(body):
+        figure.supxlabel(f"{len(as_body(body)):,} patches: each colour is a face between sharp edges", fontsize=12)
     if not swatches:
         return
     figure.legend(
@@ -122,18 +129,19 @@ def name_colors(figure: Figure, body: BodyLike) -> None:
     )
 
 
-BEYOND = "beyond the arrow: up to {:.3g} on this mesh, where it is infinite"
+EXTEND = {(False, False): "neither", (True, False): "min", (False, True): "max", (True, True): "both"}
 
 
-def color_bar(figure: Figure, panels: Any, limits: ColorRange, title: str) -> None:
+def color_bar(figure: Figure, panels: Any, limits: ColorRange, title: str, said: str = "") -> None:
     """Draw one colour bar to the right of all panels; for a field of one value it has one colour and says the value.
 
-    An arrow and a line of text say that values beyond the range have the last colour.
+    Arrows say that values outside of the range have the colours of its ends. said: a line of text on the range.
     """
     shades = ListedColormap([colormaps[MAP](0.5)]) if limits.remark else MAP
-    extend = "min" if limits.logarithmic else "neither"  # smaller values have the lowest colour
-    if limits.beyond is not None:
-        extend, title = "max", f"{title}\n{BEYOND.format(limits.beyond)}"
+    below = limits.logarithmic or limits.below is not None  # smaller values have the lowest colour
+    extend = EXTEND[below, limits.beyond is not None]
+    if said:
+        figure.supxlabel(f"colours: {said}", fontsize=11)
     bar = figure.colorbar(ScalarMappable(limits.norm(), shades), ax=panels, shrink=0.85, aspect=28, extend=extend)
     if limits.remark:
         bar.set_ticks([0.5], labels=[limits.remark])

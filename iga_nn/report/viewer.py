@@ -9,16 +9,14 @@ A scene has one frame, or several: modes, or steps in time. A frame holds the va
 fields that a frame does not have are taken from the first frame.
 """
 
-import base64
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Self
 
 import numpy as np
 from matplotlib import colormaps
-from numpy.typing import NDArray
 
-from parameterize.arrays import Array, IntArray, Knots, Mask
+from parameterize.arrays import IntArray, Knots, Mask
 from parameterize.spline.body import BodyLike, as_body
 from parameterize.spline.bspline import breakpoints
 from parameterize.spline.volume import AXES, FACE_NAMES
@@ -45,7 +43,11 @@ from ..figures.fields import (
     vectors_of,
     warp_of,
 )
+from ..figures.first_view import shown_from
+from ..figures.outline import is_by_face, smooth_colors
 from ..options import NO_UNITS, Units
+from .layers import layers_of
+from .packed import Drawn, packed
 
 Scene = dict[str, Any]
 
@@ -105,14 +107,17 @@ def scene_of(
     units: the units in the titles of the bars. coarser: 1 for all points, 2 for every second point.
     """
     if solution is None or not all(np.all(np.isfinite(field.coefficients)) for field in solution.patches):
-        return _scene(body, [Frame("", [])], coarser)
+        return _scene(body, [Frame("", [])], coarser) | {"unit": units.displacement or ""}
     if isinstance(solution, BodyField) and solution.body is None:  # as a file holds it
         solution = replace(solution, body=as_body(body))
     frame = Frame.of("", solution)
     if problem is not None and problem.exact is not None:
         frame = replace(frame, fields=[*frame.fields, error_of(body, solution, problem)])
-    frame = replace(frame, fields=[replace(field, title=field.titled(units)) for field in frame.fields])
-    return _scene(body, [frame], coarser) | {"warp": warp_of(solution, points_of(body).diagonal)}
+    return (
+        _scene(body, [frame], coarser, solution, units)
+        | {"warp": warp_of(solution, points_of(body).diagonal)}
+        | {"unit": units.displacement or ""}
+    )
 
 
 def scene_of_frames(
@@ -155,30 +160,6 @@ def scene_of_frames(
     return _scene(body, alike, coarser=2) | {"warp": factor, "oscillates": oscillates}
 
 
-@dataclass(frozen=True, eq=False)
-class Drawn:
-    """Say which samples of a body the page has: those on some faces, and in the lattices, every second for `coarser` 2.
-
-    faces: the places of the outer faces among the nine faces and sections of each patch.
-    """
-
-    faces: IntArray
-    coarser: int
-
-    def thinned(self, samples: Samples) -> tuple[Array, Array]:
-        """Return every second point on the faces (f, m, m, ...) and all points in the lattices (patches, n, n, n, ...).
-
-        With `coarser` 2 both have half as many points a direction.
-        """
-        step, twice = slice(None, None, self.coarser), slice(None, None, 2 * self.coarser)
-        return samples.on(self.faces)[:, twice, twice], samples.lattices[:, step, step, step]
-
-    def packed(self, samples: Samples, shares: Callable[[Array], Array]) -> dict[str, str]:
-        """Return the packed shares of samples, on the faces and in the lattices."""
-        faces, lattices = self.thinned(samples)
-        return {"faces": _packed(shares(faces)), "lattice": _packed(shares(lattices))}
-
-
 def _coarser(points: Samples, wanted: int) -> int:
     """Return the step in which samples are taken: the wanted one where what is left has the planes of a body cut open.
 
@@ -189,12 +170,17 @@ def _coarser(points: Samples, wanted: int) -> int:
     return 1 if any(row % parts for row in rows) else wanted
 
 
-def _scene(body: BodyLike, frames: Sequence[Frame], coarser: int) -> Scene:
-    """Return a scene of frames with the same fields; the distortion of the body joins the first frame's fields."""
+def _scene(
+    body: BodyLike, frames: Sequence[Frame], coarser: int, solution: FieldOnBody | None = None, units: Units = NO_UNITS
+) -> Scene:
+    """Return a scene of frames with the same fields; the distortion of the body joins the first frame's fields.
+
+    solution: its regions of data and its singular places are layers of the scene, and choose the first view.
+    """
     points, patches = points_of(body), as_body(body).patches
     drawn = Drawn(outer_faces(body), _coarser(points, coarser))
     low, high = points.cloud.min(axis=0), points.cloud.max(axis=0)
-    left_out, view = cut_of(body, points, points)
+    left_out, view = cut_of(body, points, points, shown_from(body, solution))
     count, many = (part.shape[1] for part in drawn.thinned(points))
     whole = [replace(frames[0], fields=[*frames[0].fields, distortion_of(body)]), *frames[1:]]
     bound = _bound(frames)
@@ -211,11 +197,13 @@ def _scene(body: BodyLike, frames: Sequence[Frame], coarser: int) -> Scene:
         "spans": spans,
         "meshes": meshes,  # of each patch the number of its entry in `spans`
         **_colors(body, drawn.faces),
-        "map": _packed(colormaps[MAP](np.arange(256))[:, :3], np.uint8),  # (256, 3)
-        "fields": [_described(field, frames[0]) for field in whole[0].fields],
+        "map": packed(colormaps[MAP](np.arange(256))[:, :3], np.uint8),  # (256, 3)
+        "fields": [_described(field, frames[0], units) for field in whole[0].fields],
+        **layers_of(body, solution, drawn),
         "frames": [_values(frame, bound, drawn) for frame in whole],
         "bound": bound,  # of the entries of all vectors
         "warp": 0.0,
+        "unit": "",
         "oscillates": False,
         "opening": _opening(frames[0], drawn.faces),
     }
@@ -251,7 +239,8 @@ def _colors(body: BodyLike, outer: IntArray) -> dict[str, Any]:
     patches, faces = np.divmod(outer, PER_PATCH)
     pairs = zip(patches.tolist(), faces.tolist(), strict=True)
     named = face_labels() if glued.is_single else [glued.face_name(patch, FACE_NAMES[face]) for patch, face in pairs]
-    found = {"colors": colors[patches, faces].tolist(), "labels": named, "legend": color_labels(body)}
+    chosen = smooth_colors(body) if is_by_face(body) else colors[patches, faces].tolist()
+    found = {"colors": chosen, "labels": named, "legend": color_labels(body)}
     if glued.solids.are_several:
         found |= {"solids": glued.solids.numbers.tolist(), "solid_names": glued.solids.labels}
     return found
@@ -276,11 +265,12 @@ def _opening(frame: Frame, outer: IntArray) -> dict[str, str]:
     return {"field": field.name, "part": "cut" if is_even and not frame.displaces else "surface"}
 
 
-def _described(field: ColoredField, frame: Frame) -> dict[str, Any]:
+def _described(field: ColoredField, frame: Frame, units: Units) -> dict[str, Any]:
     """Return the words of a field for the controls and the bar; the page computes its values from vectors if it can."""
     limits = field.limits.whole
-    described = {"name": field.name, "title": field.title, "low": limits.low, "high": limits.high}
-    described |= {"logarithmic": limits.logarithmic, "remark": limits.remark, "shown": field.limits.high}
+    described = {"name": field.name, "title": field.titled(units), "low": limits.low, "high": limits.high}
+    described |= {"logarithmic": limits.logarithmic, "remark": limits.remark, "said": field.said(units)}
+    described |= {"shown": [field.limits.low, field.limits.high]}
     return described | ({"component": COMPONENTS[field.name]} if _is_derived(field, frame) else {})
 
 
@@ -297,9 +287,3 @@ def _values(frame: Frame, bound: float, drawn: Drawn) -> dict[str, Any]:
     }
     vectors = frame.vectors and drawn.packed(frame.vectors, lambda found: 0.5 + 0.5 * found / bound)
     return {"label": frame.label, "values": values, "vectors": vectors}
-
-
-def _packed(shares: NDArray[Any], kind: type[np.unsignedinteger[Any]] = np.uint16) -> str:
-    """Return numbers 0..1 as whole numbers over the range of `kind`, little-endian, in Base64."""
-    numbers = np.rint(np.clip(shares, 0.0, 1.0) * np.iinfo(kind).max).astype(np.dtype(kind).newbyteorder("<"))
-    return base64.b64encode(numbers.tobytes()).decode("ascii")

@@ -59,3 +59,20 @@ def ring(patches, shape=(6, 4, 3), degrees=(2, 2, 1), twist=0.0):
         return mapped(place, shape, degrees)
 
     return Body.from_patches([part(number) for number in range(patches)])
+
+
+def hollow():
+    """A cube from -2 to 2 with a cubic hole from -1/2 to 1/2 inside, of six blocks."""
+
+    def block(axis, side):
+        b, c = (axis + 1) % 3, (axis + 2) % 3
+
+        def place(u, v, w):
+            far = 0.5 + 1.5 * w
+            found = [None, None, None]
+            found[axis], found[b], found[c] = side * far, side * far * (2.0 * u - 1.0), far * (2.0 * v - 1.0)
+            return tuple(found)
+
+        return mapped(place, (2, 2, 2), (1, 1, 1))
+
+    return Body.from_patches([block(axis, side) for axis in range(3) for side in (1.0, -1.0)])

@@ -18,7 +18,11 @@ function unpacked(scene) {
   const extent = scene.high.map((value, axis) => value - scene.low[axis]), size = Math.hypot(...extent) || 1;
   const places = both(scene.places, Float32Array, (share, at) => (share - 0.5) * extent[at % 3] / size);
   const middle = scene.low.map((value, axis) => value + 0.5 * extent[axis]);
-  return {...scene, size, middle, places, map: bytes(scene.map), found: scene.frames.map(() => ({}))};
+  const whole = (text) => new Uint32Array(bytes(text).buffer);
+  const regions = scene.regions && {...scene.regions, numbers: bytes(scene.regions.numbers)};
+  const singular = scene.singular && {...scene.singular, marks: whole(scene.singular.marks)};
+  const layers = {edges: whole(scene.edges), regions, singular};
+  return {...scene, ...layers, size, middle, places, map: bytes(scene.map), found: scene.frames.map(() => ({}))};
 }
 
 function vectorsOf(scene, frame) {

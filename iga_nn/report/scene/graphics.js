@@ -3,14 +3,17 @@
 const OUTLINE = "#7f8b97";
 const NEARER = 0.002;  // of the depth: keeps outlines before the patches they surround
 const BINS = 1024;  // of a parameter, in each of which one element line is nearest
-const LIT = 0, FLAT = 1, FAINT = 2;  // how a plain colour looks
+const LIT = 0, FLAT = 1, FAINT = 2, DOT = 3;  // how a plain colour looks
+const DOT_SIZE = 9, STRIPE = [14, 5];  // pixels: of a dot; from a stripe to the next, and of its width
 
 const VERTEX_SHADER = `#version 300 es
 in vec3 place, normal, parameter, paint;
 in float value, mesh;
+in vec4 stripe;
 uniform mat3 turn;
 uniform vec2 scale, shift;
-uniform float nearer;
+uniform float nearer, dot_size;
+out vec4 striped;
 out vec3 facing, parameters, plain;
 out float share;
 flat out int row;
@@ -22,16 +25,20 @@ void main() {
   share = value;
   plain = paint;
   row = int(mesh);
+  striped = stripe;
+  gl_PointSize = dot_size;
 }`;
 
 const FRAGMENT_SHADER = `#version 300 es
 precision highp float;
 in vec3 facing, parameters, plain;
+in vec4 striped;
 in float share;
 flat in int row;
 uniform sampler2D map, spans;
 uniform int look;
-uniform bool mapped, lined;
+uniform bool mapped, lined, regions;
+uniform float ratio;
 out vec4 color;
 void main() {
   float towards = abs(normalize(facing).z);
@@ -40,15 +47,18 @@ void main() {
     color = vec4(plain * dense, dense);
     return;
   }
+  if (look == ${DOT} && length(gl_PointCoord - 0.5) > 0.5) discard;
   vec3 base = plain;
   if (mapped) base = texture(map, vec2(share, 0.5)).rgb;
   else if (look == ${LIT}) base *= 0.5 + 0.5 * towards;
-  if (lined && look != ${FLAT}) {
+  if (lined && look == ${LIT}) {
     vec3 width = fwidth(parameters), nearest;
     for (int k = 0; k < 3; k++) nearest[k] = texelFetch(spans, ivec2(int(parameters[k] * ${BINS - 1}.0 + 0.5), row), 0)[k];
     vec3 near = mix(vec3(9.0), abs(parameters - nearest) / max(width, 1e-7), greaterThan(width, vec3(1e-7)));
     base *= 1.0 - 0.45 * (1.0 - smoothstep(0.4, 1.3, min(near.x, min(near.y, near.z))));
   }
+  bool on_stripe = mod((gl_FragCoord.x + gl_FragCoord.y) / ratio, ${STRIPE[0]}.0) < ${STRIPE[1]}.0;
+  if (regions && look == ${LIT} && striped.a > 0.5 && on_stripe) base = striped.rgb;
   color = vec4(base, 1.0);
 }`;
 
@@ -141,6 +151,8 @@ class Graphics {
     const gl = this.gl;
     this.program = compiled(gl);
     this.loaded = [];
+    this.palette = scene.regions?.legend.map(([color]) => rgb(color));
+    gl.vertexAttrib4f(gl.getAttribLocation(this.program, "stripe"), 0, 0, 0, 0);  // where no region is sent
     this.#texture("spans", 1, gl.RGB32F, [BINS, scene.spans.length], gl.FLOAT, nearestLines(scene.spans));
     this.#texture("map", 0, gl.RGB, [256, 1], gl.UNSIGNED_BYTE, scene.map);
     gl.enable(gl.DEPTH_TEST);
@@ -163,7 +175,7 @@ class Graphics {
 
   // Takes the place of what was loaded. `range` says where a value lies on the colour bar. Ghosts are drawn first, so
   // that they dim no colour of the patches.
-  load({patches, ghosts, outlines}, range) {
+  load({patches, ghosts, outlines, edges, dots}, range) {
     for (const {array, buffers} of this.loaded) {
       this.gl.deleteVertexArray(array);
       for (const buffer of buffers) this.gl.deleteBuffer(buffer);
@@ -171,12 +183,14 @@ class Graphics {
     this.loaded = [
       this.#sent(ghosts, FAINT),
       this.#sent(patches, LIT, range),
-      this.#sent(outlines.map((patch) => ({...patch, plain: OUTLINE})), FLAT),
+      this.#sent(outlines.map((patch) => ({...patch, plain: OUTLINE})), FLAT, null, "blocks"),
+      this.#sent(edges, FLAT, null, "edges"),
+      this.#sent(dots, DOT, null, "singular"),
     ];
   }
 
   // Sends patches as one: of thousands, each alone would take its time.
-  #sent(patches, look, range = null) {
+  #sent(patches, look, range = null, layer = "body") {
     const gl = this.gl, array = gl.createVertexArray(), buffers = [];
     const mapped = Boolean(range && patches.length && patches[0].values);
     const buffer = (kind, data) => {
@@ -191,22 +205,31 @@ class Graphics {
       gl.vertexAttribPointer(at, size, gl.FLOAT, false, 0, 0);
     };
     const places = joined(Float32Array, patches.map((patch) => patch.places));
-    const corners = numbered(patches, (patch) => look === FLAT ? patch.border : patch.corners);
+    const corners = numbered(patches, (patch) => look === FLAT || look === DOT ? patch.border : patch.corners);
     gl.bindVertexArray(array);
     attribute("place", places, 3);
-    attribute("parameter", joined(Float32Array, patches.map((patch) => patch.parameters)), 3);
+    if (look === LIT) attribute("parameter", joined(Float32Array, patches.map((patch) => patch.parameters)), 3);
+    if (look === LIT && this.scene.regions) attribute("stripe", joined(Float32Array, patches.map((patch) => this.#stripes(patch))), 4);
     attribute("paint", repeated(patches, (patch) => rgb(patch.plain)), 3);
     attribute("mesh", repeated(patches, (patch) => [this.scene.meshes[patch.cube]]), 1);
     if (mapped) attribute("value", Float32Array.from(joined(Float64Array, patches.map((patch) => patch.values)), (value) => range.share(value)), 1);
-    if (look !== FLAT) attribute("normal", normals(places, corners), 3);
+    if (look === LIT || look === FAINT) attribute("normal", normals(places, corners), 3);
     buffer(gl.ELEMENT_ARRAY_BUFFER, corners);
     gl.bindVertexArray(null);
-    return {array, buffers, look, mapped, count: corners.length};
+    return {array, buffers, look, mapped, layer, count: corners.length};
   }
 
-  draw(camera, lined) {
+  // The colour of the region at each place of a patch, and 1; or zeros.
+  #stripes(patch) {
+    const found = new Float32Array(patch.places.length / 3 * 4);
+    patch.regions?.forEach((number, at) => { if (number) found.set([...this.palette[number - 1], 1], 4 * at); });
+    return found;
+  }
+
+  // layers: which of those are drawn: lined, regions, blocks, edges, singular.
+  draw(camera, layers) {
     const gl = this.gl, canvas = this.canvas;
-    sharpened(canvas);
+    const ratio = sharpened(canvas);
     gl.viewport(0, 0, canvas.width, canvas.height);
     gl.clearColor(0, 0, 0, 0);  // the page's own background
     gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
@@ -214,15 +237,19 @@ class Graphics {
     gl.uniform2f(this.uniform("scale"), fit / canvas.clientWidth, fit / canvas.clientHeight);
     gl.uniform2f(this.uniform("shift"), 2 * camera.shift[0] / canvas.clientWidth, -2 * camera.shift[1] / canvas.clientHeight);
     gl.uniformMatrix3fv(this.uniform("turn"), true, camera.view.flat());
-    gl.uniform1i(this.uniform("lined"), lined);
-    for (const {array, look, mapped, count} of this.loaded) {
-      gl.uniform1f(this.uniform("nearer"), look === FLAT ? NEARER : 0);
+    gl.uniform1i(this.uniform("lined"), layers.lined);
+    gl.uniform1i(this.uniform("regions"), layers.regions);
+    gl.uniform1f(this.uniform("ratio"), ratio);
+    gl.uniform1f(this.uniform("dot_size"), DOT_SIZE * ratio * (canvas.clientWidth < NARROW ? 0.6 : 1));
+    for (const {array, look, mapped, layer, count} of this.loaded) {
+      if (layers[layer] === false) continue;
+      gl.uniform1f(this.uniform("nearer"), layer === "body" ? 0 : layer === "blocks" ? NEARER : 2 * NEARER);
       gl.uniform1i(this.uniform("mapped"), mapped);
       gl.uniform1i(this.uniform("look"), look);
       (look === FAINT ? gl.enable : gl.disable).call(gl, gl.BLEND);
       gl.depthMask(look !== FAINT);
       gl.bindVertexArray(array);
-      gl.drawElements(look === FLAT ? gl.LINES : gl.TRIANGLES, count, gl.UNSIGNED_INT, 0);
+      gl.drawElements(look === FLAT ? gl.LINES : look === DOT ? gl.POINTS : gl.TRIANGLES, count, gl.UNSIGNED_INT, 0);
     }
     gl.depthMask(true);
   }

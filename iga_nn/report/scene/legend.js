@@ -1,13 +1,23 @@
 // Says what the colours mean: a swatch a face, or the colour bar with its ticks and a range that can be changed.
 
+const MOST_TOLD = 3;  // singular places that are named
 const DECADES = 1e-4;  // of the largest value: where a logarithmic range of values that reach zero begins
 
 // The values between which a field is coloured, evenly or by their logarithms.
 class ColorRange {
-  constructor({low, high, logarithmic, remark, shown = high}) {
-    Object.assign(this, {least: low, largest: high, first: logarithmic, remark});
+  constructor({low, high, logarithmic, remark, shown, said}) {
+    Object.assign(this, {least: low, largest: high, first: logarithmic, remark, shown, said});
     this.reset();
-    this.high = shown;  // a stress that is infinite somewhere is shown as it is elsewhere
+    this.showMost();
+  }
+
+  // The range of most of the body, where peaks would take the others' colours.
+  showMost() {
+    [this.low, this.high] = this.shown;
+  }
+
+  get isMost() {
+    return Boolean(this.said) && this.low === this.shown[0] && this.high === this.shown[1];
   }
 
   reset() {
@@ -25,8 +35,8 @@ class ColorRange {
 
   // What stands behind the title of a bar.
   get words() {
-    const larger = !this.remark && this.high < 0.9999 * this.largest && `▸ up to ${written(this.largest)}`;
-    return [this.logarithmic && "logarithmic", larger].filter(Boolean);
+    const larger = !this.remark && this.high < this.largest - 1e-4 * (this.largest - this.least);
+    return [this.logarithmic && "logarithmic", this.isMost ? this.said : larger && `▸ up to ${written(this.largest)}`].filter(Boolean);
   }
 
   // Why a range cannot be shown; "" where it can.
@@ -87,13 +97,16 @@ function showLegend(scene, field, range) {
       put(item, "chip").style.background = color;
       item.append(label);
     });
+    if (scene.smooth) put(place, "title", `${scene.blocks.toLocaleString("en")} blocks; each colour is a face between sharp edges, of ${scene.smooth}`);
     return;
   }
-  put(place, "title", [field.title, ...range.words].join(", "));
+  put(place, "title", field.title);
   const bar = put(place, "bar"), colors = stops(scene.map);
   put(bar, "colors").style.background = range.remark ? colors[128] : `linear-gradient(to right, ${colors.join(",")})`;
   if (range.remark) put(place, "end", range.remark);
   for (const value of range.ticks) put(bar, "tick", written(value)).style.left = `${100 * range.share(value)}%`;
+  if (range.words.length) put(place, "said", range.words.join(", "));
+  element("most").hidden = !range.said || range.isMost;
   for (const end of ["low", "high"]) {
     element(end).value = String(Number(range[end].toPrecision(4)));
     element(end).setCustomValidity("");
@@ -114,5 +127,23 @@ function watchRange(current, changed) {
       if (!refusal) Object.assign(range, given), changed();
     });
   element("whole").addEventListener("click", () => { current().reset(); changed(); });
+  element("most").addEventListener("click", () => { current().showMost(); changed(); });
   element("decades").addEventListener("change", (event) => { current().inDecades = event.target.checked; changed(); });
+}
+
+// Says what the layers are: a striped swatch for each region of data, a dot for singular places.
+function showLayers(scene) {
+  const place = element("layers");
+  place.replaceChildren();
+  const add = (kind, color, label) => {
+    const item = put(place, "swatch");
+    put(item, `chip ${kind}`).style.color = color;
+    item.append(label);
+  };
+  if (scene.regions && element("regions").checked) for (const [color, label] of scene.regions.legend) add("striped", color, label);
+  if (scene.singular && element("singular").checked) add("dot", MARK, `infinite at ${scene.singular.texts.slice(0, MOST_TOLD).join(", ")}${rest(scene.singular.texts)}`);
+}
+
+function rest(texts) {
+  return texts.length > MOST_TOLD ? ` and ${texts.length - MOST_TOLD} more` : "";
 }

@@ -1,6 +1,8 @@
 // Starts the view: what is shown, its controls, and what is said where it cannot be shown.
 
 const element = (id) => document.getElementById(id);
+const LAYERS = ["lined", "blocks", "edges", "regions", "singular"];  // what may be drawn over the colours
+const BORDERED = 150;  // blocks: the borders of more would cover the colours
 const chosen = (name) => document.querySelector(`input[name=${name}]:checked`).value;
 
 // What is seen of a scene, and how; the controls of the page change it.
@@ -21,6 +23,10 @@ class View {
 
   get range() {
     return this.field && this.ranges[this.field.name];
+  }
+
+  get layers() {
+    return Object.fromEntries(LAYERS.map((name) => [name, element(name).checked]));
   }
 
   get warp() {
@@ -57,7 +63,7 @@ class View {
 
   draw(ink = getComputedStyle(this.canvas).color) {
     if (!this.shown) return;  // while it starts
-    this.graphics.draw(this.camera, element("lined").checked);
+    this.graphics.draw(this.camera, this.layers);
     const patch = this.probed && this.shown.patches[this.probed.patch];
     const mark = patch && AXES.map((axis) => mixed(patch.places, 3, this.probed.corners, this.probed.weights, axis));
     drawOverlay(element("overlay"), this.scene, this.camera, mark, ink);
@@ -125,7 +131,7 @@ function start(scene) {
   element("at").addEventListener("input", () => view.choosePart());
   element("warp").addEventListener("input", () => view.load());
   element("frame").addEventListener("input", (event) => view.player.show(Number(event.target.value)));
-  element("lined").addEventListener("change", () => view.draw());
+  for (const name of LAYERS) element(name).addEventListener("change", () => { showLayers(scene); view.draw(); });
   element("views").addEventListener("change", (event) => camera.look(VIEWS[event.target.value] || scene.view));
   press("play", () => view.player.toggle());
   press("larger", () => camera.enlarge(1.3));
@@ -157,6 +163,10 @@ function setControls(scene) {
   const named = location.hash.slice(1);
   if (!check("field", named)) check("field", scene.opening.field);
   check("part", named === "faces" ? "surface" : scene.opening.part);
+  const has = {regions: scene.regions, singular: scene.singular, edges: scene.edges.length};
+  for (const name in has) if (!has[name]) element(name).parentElement.hidden = true;
+  element("blocks").checked = scene.blocks <= BORDERED;
+  showLayers(scene);
   element("at").step = 1 / (scene.samples.lattice - 1);
   element("warping").hidden = !scene.warp;
   [element("warp").max, element("warp").value] = [2 * scene.warp, scene.warp];

@@ -1,7 +1,7 @@
 // Draws over the picture: axes, a scale bar, the probed place. Saves the picture with its colour bar.
 
 const AXIS_COLORS = ["#cc3311", "#228833", "#3377cc"];
-const ARM = 30, EDGE = 16;  // pixels: of an axis; from the canvas's edge
+const ARM = 30, SMALL_ARM = 18, NARROW = 500, EDGE = 16;  // pixels: of an axis; from the canvas's edge
 const SCALE = 0.25;  // of the width: the scale bar is no longer
 
 function drawOverlay(canvas, scene, camera, mark, ink) {
@@ -10,12 +10,13 @@ function drawOverlay(canvas, scene, camera, mark, ink) {
   pen.scale(ratio, ratio);
   pen.font = "13px system-ui, sans-serif";
   pen.lineWidth = 2;
-  drawAxes(pen, camera.view, [EDGE + ARM + 6, height - EDGE - ARM - 6]);
+  const arm = width < NARROW ? SMALL_ARM : ARM;
+  drawAxes(pen, camera.view, [EDGE + arm + 6, height - EDGE - arm - 6], arm);
   drawScale(pen, scene, camera.fit(canvas), width, height, ink);
   if (mark) drawMark(pen, camera, camera.fit(canvas), mark, width, height);
 }
 
-function drawAxes(pen, view, [x, y]) {
+function drawAxes(pen, view, [x, y], arm) {
   pen.textAlign = "center";
   pen.textBaseline = "middle";
   for (const axis of [...AXES].sort((a, b) => view[2][a] - view[2][b])) {  // the nearest last
@@ -23,9 +24,9 @@ function drawAxes(pen, view, [x, y]) {
     pen.strokeStyle = pen.fillStyle = AXIS_COLORS[axis];
     pen.beginPath();
     pen.moveTo(x, y);
-    pen.lineTo(x + ARM * right, y - ARM * up);
+    pen.lineTo(x + arm * right, y - arm * up);
     pen.stroke();
-    pen.fillText("xyz"[axis], x + (ARM + 10) * right, y - (ARM + 10) * up);
+    pen.fillText("xyz"[axis], x + (arm + 10) * right, y - (arm + 10) * up);
   }
 }
 
@@ -41,7 +42,7 @@ function drawScale(pen, scene, fit, width, height, ink) {
   pen.stroke();
   pen.textAlign = "right";
   pen.textBaseline = "bottom";
-  pen.fillText(written(length), right, y - 6);
+  pen.fillText([written(length), scene.unit].filter(Boolean).join(" "), right, y - 6);
 }
 
 function drawMark(pen, camera, fit, place, width, height) {

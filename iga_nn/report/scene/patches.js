@@ -8,7 +8,7 @@ const INSIDE = "#b8bdc7";  // of sections where no field is shown
 const GHOST = "#8b95a1";  // of the rest around a section
 const WHOLE = 15;  // all quarters: the quarter (i, j) of a patch is bit 2 i + j
 const AXES = [0, 1, 2];
-const MOST_OUTLINED = 3000;  // faces: the borders of more would cover the colours
+const SHARP_EDGE = "#98a2ad", MARK = "#d4145a";  // of sharp edges; of places where a gradient is infinite
 
 function remembered(make) {
   const known = {};
@@ -86,6 +86,7 @@ function facePatch(body, face, quarters = WHOLE) {
   return filled(body, {
     face, cube, plain: scene.colors[face], corners: triangles(n, quarters), border: border(n, quarters),
     parameters: parametersOn(n, side >> 1, side % 2),
+    regions: scene.regions?.numbers.subarray(count * face, count * (face + 1)),
     take: (source, k) => source.faces.subarray(k * count * face, k * count * (face + 1)),
   });
 }
@@ -101,19 +102,28 @@ function sectionPatch(body, cube, axis, at, quarters = WHOLE) {
 }
 
 // What is seen: "surface", "cut", or the section at `share` of the way along "u", "v", "w", "x", "y" or "z". Lists of the
-// patches, of those that stay as a ghost around a section, and of those whose borders show the shape.
+// patches, of those that stay as a ghost around a section, of those whose borders are blocks, of sharp edges, and of dots.
 function patchesOf(body, part, share) {
   const {scene} = body, last = scene.samples.lattice - 1;
   if (part === "cut") {
     const faces = scene.cut.faces.map(([face, quarters]) => facePatch(body, face, quarters));
     const planes = scene.cut.planes.map(([cube, axis, at, quarters]) => sectionPatch(body, cube, axis, at * last, quarters));
-    return {patches: [...faces, ...planes], ghosts: [], outlines: planes};
+    const whole = new Set(scene.cut.faces.filter(([, quarters]) => quarters === WHOLE).map(([face]) => face));
+    return {patches: [...faces, ...planes], ghosts: [], outlines: [...faces, ...planes], ...marksOf(body, whole)};
   }
-  const faces = scene.outer.map((_, face) => facePatch(body, face)), outlines = faces.length > MOST_OUTLINED ? [] : faces;
-  if (part === "surface") return {patches: faces, ghosts: [], outlines: body.values ? outlines : []};
+  const faces = scene.outer.map((_, face) => facePatch(body, face));
+  if (part === "surface") return {patches: faces, ghosts: [], outlines: faces, ...marksOf(body)};
   const axis = scene.axes.indexOf(part), cubes = [...scene.meshes.keys()];
   const sections = axis < 0 ? cubes.map((cube) => planeSection(body, cube, "xyz".indexOf(part), share))
     : cubes.map((cube) => sectionPatch(body, cube, axis, Math.round(share * last)));
   const patches = sections.filter((patch) => patch.corners.length);
-  return {patches, ghosts: faces.map((patch) => ({...patch, plain: GHOST})), outlines};
+  return {patches, ghosts: faces.map((patch) => ({...patch, plain: GHOST})), outlines: [], ...marksOf(body)};
+}
+
+// The sharp edges and the marks of singular places, those on some outer faces or on all of them.
+function marksOf(body, faces = null) {
+  const {scene} = body, per = scene.samples.faces ** 2, places = body.places.faces;
+  const kept = (numbers) => faces ? numbers.filter((at) => faces.has(Math.floor(at / per))) : numbers;
+  const mark = (numbers, plain) => numbers.length ? [{places, plain, cube: 0, border: kept(numbers)}] : [];
+  return {edges: mark(scene.edges, SHARP_EDGE), dots: mark(scene.singular?.marks ?? [], MARK)};
 }

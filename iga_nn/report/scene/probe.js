@@ -54,7 +54,7 @@ function pointAt(scene, patch, {corners, weights}) {
 function readings(scene, frame, patch, hit) {
   const {corners, weights} = hit;
   const found = [
-    ["x, y, z", pointAt(scene, patch, hit).map(written).join(", ")],
+    ["x, y, z", [pointAt(scene, patch, hit).map(written).join(", "), scene.unit].filter(Boolean).join(" ")],
     ...(scene.meshes.length > 1 ? [["patch", `p${patch.cube}`]] : []),
     ...(scene.solids ? [["solid", scene.solid_names[scene.solids[patch.cube]]]] : []),
     ["u, v, w", AXES.map((axis) => mixed(patch.parameters, 3, corners, weights, axis).toFixed(3)).join(", ")],
