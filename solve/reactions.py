@@ -132,7 +132,6 @@ def balance(
         if isinstance(face, WeakFace):
             own = own + _given(face, layout, places, added)
             own = own - _add_regions(here[0], face, on_face, supports, added)
-            own = own - _add_regions(here[0], face, on_face, supports, added)
         elif isinstance(face, FaceRule):
             own = own - _add_robin_faces(here, face, on_face, supports)
     whole = total(own)

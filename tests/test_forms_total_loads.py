@@ -26,6 +26,7 @@ def test_the_resultant_of_a_load_in_total_is_exact_on_regions_of_several_patches
     force, moment, point = np.array([1.0, -2.0, 500.0]), np.array([3.0, 4.0, -20.0]), np.array([7.0, 8.0, 9.0])
     found = balance(exact_ring(), moment={region: moment}, remote_force={region: (force, point)})
     np.testing.assert_allclose(found.load, force, atol=1e-10 * 500)
+    assert found.imbalance < 1e-8
     np.testing.assert_allclose(found.moments.load, moment + np.cross(point, force), atol=1e-10 * 5000)
 
 
