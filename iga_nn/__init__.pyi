@@ -32,6 +32,10 @@ from solve import newton as newton
 from solve import resultant as resultant
 from solve import solve_problem
 from solve.forms.conditions import *
+from solve.forms.hyperelasticity import MooneyRivlin as MooneyRivlin
+from solve.forms.hyperelasticity import NeoHookean as NeoHookean
+from solve.forms.hyperelasticity import Yeoh as Yeoh
+from solve.forms.plasticity import Plasticity as Plasticity
 
 from .batch.run_batch import run_batch as run_batch
 from .errors import InputError as InputError
@@ -40,7 +44,9 @@ from .io.formats import export as export
 from .io.formats import load_volume as load_volume
 from .io.solutions import load_solution as load_solution
 from .options import ElasticityOptions as ElasticityOptions
+from .options import FiniteOptions as FiniteOptions
 from .options import MapOptions as MapOptions
+from .options import PlasticOptions as PlasticOptions
 from .options import PoissonOptions as PoissonOptions
 from .options import WorkerOptions as WorkerOptions
 from .samples import sample as sample

@@ -1,6 +1,6 @@
 """Defines the functions on a body as solution.npz stores them, and points with known parameters."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
@@ -19,6 +19,7 @@ from parameterize.spline.sampled_boundary import SampledBoundary
 from parameterize.spline.volume import BSplineVolume, checked_knots, load_spline, save_spline
 
 ARRAYS = (*BASIS, "coefficients")  # of a patch in solution.npz
+MORE = ("pressure", "state")  # arrays that only some solutions have
 FARTHEST = 1e4  # of the volume's size: from there rounding hides which point of it is nearest
 
 
@@ -27,13 +28,15 @@ class Points(np.ndarray[Any, Any]):
 
     rows: the parameters of a tensor grid, an array a direction; None where they are unknown, as for a part of the
     array. order: the directions along which the axes (...) run. places: the parameters (m, 3) of points (3, m) without
-    a grid. pressure: the pressure (...) there of a solution that has one, as a law's quantities receive it.
+    a grid. pressure: the pressure (...) there of a solution that has one, as a law's quantities receive it. state: the
+    internal variables (k, ...) there of a law with a history.
     """
 
     rows: Sequence[ArrayLike] | None = None
     order: tuple[int, ...] = (0, 1, 2)
     places: Array | None = None
     pressure: Array | None = None
+    state: Array | None = None
 
     @classmethod
     def of(cls, x: Array, rows: Sequence[ArrayLike], order: tuple[int, ...] = (0, 1, 2)) -> Self:
@@ -125,6 +128,8 @@ class SplineField(Brief, FieldOnBody):
         The volume on which the field was found; None for a function on any volume.
     pressure : (m_u, m_v, m_w) array, optional
         The coefficients of the pressure of a nearly incompressible body, with the displacement as the field.
+    state : (m_u, m_v, m_w, k) array, optional
+        The coefficients of the internal variables of a law with a history, such as the plastic strain.
 
     Raises
     ------
@@ -146,6 +151,7 @@ class SplineField(Brief, FieldOnBody):
     coefficients: Array
     geometry: BSplineVolume | None = None
     pressure: Array | None = field(default=None, repr=False)
+    state: Array | None = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
         shape = np.shape(self.coefficients)
@@ -155,6 +161,8 @@ class SplineField(Brief, FieldOnBody):
             raise ValueError(
                 f"pressure must have the shape {shape[:3]} of the coefficients, got {np.shape(self.pressure)}"
             )
+        if self.state is not None and (np.ndim(self.state) != 4 or np.shape(self.state)[:3] != shape[:3]):
+            raise ValueError(f"state must have the shape ({shape[:3]}, k), got {np.shape(self.state)}")
         object.__setattr__(self, "knots", checked_knots(self.degrees, self.knots, shape[:3], "coefficients"))
 
     def __call__(self, points: ArrayLike) -> Array:
@@ -199,13 +207,15 @@ class SplineField(Brief, FieldOnBody):
 
     @property
     def columns(self) -> Array:
-        """Return the coefficients (m_u, m_v, m_w, c) of all components, and of a pressure as one more."""
-        vectors = self.coefficients.reshape(*self.coefficients.shape[:3], -1)
-        return vectors if self.pressure is None else np.concatenate([vectors, self.pressure[..., None]], axis=-1)
+        """Return the coefficients (m_u, m_v, m_w, c) of all components, then of the state, and last of a pressure."""
+        parts = [self.coefficients.reshape(*self.coefficients.shape[:3], -1)]
+        parts += [] if self.state is None else [self.state]
+        parts += [] if self.pressure is None else [self.pressure[..., None]]
+        return parts[0] if len(parts) == 1 else np.concatenate(parts, axis=-1)
 
     def save(self, path: str | Path) -> None:
-        """Write solution.npz (degrees, knots_u, knots_v, knots_w, coefficients, pressure if any) atomically."""
-        save_spline(path, self.degrees, self.knots, coefficients=self.coefficients, **_pressure_of(self))
+        """Write solution.npz (degrees, knots_u, .., coefficients, pressure and state if any) atomically."""
+        save_spline(path, self.degrees, self.knots, coefficients=self.coefficients, **_more_of(self))
 
     @staticmethod
     def load(path: str | Path) -> "SplineField":
@@ -214,8 +224,7 @@ class SplineField(Brief, FieldOnBody):
         Raises FileNotFoundError, or a ValueError that names the defect of the file.
         """
         degrees, knots, coefficients = load_spline(path, "coefficients")
-        pressure = load_arrays(path, (), ("pressure",)).get("pressure")
-        return _checked(str(path), np.array(degrees), knots, coefficients, pressure)
+        return _checked(str(path), np.array(degrees), knots, coefficients, load_arrays(path, (), MORE))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -303,7 +312,7 @@ class BodyField(Brief, FieldOnBody):
         coefficients: those of each patch, by default its own.
         """
         parts = [
-            dict(zip(ARRAYS, (np.array(patch.degrees), *patch.knots, values), strict=True)) | _pressure_of(patch)
+            dict(zip(ARRAYS, (np.array(patch.degrees), *patch.knots, values), strict=True)) | _more_of(patch)
             for patch, values in zip(self.patches, coefficients or self._coefficients, strict=True)
         ]
         return parts[0] if self.is_single else named_arrays(parts)
@@ -325,27 +334,31 @@ class BodyField(Brief, FieldOnBody):
         if not any(name.endswith("_degrees") for name in array_names(path)):
             return BodyField((SplineField.load(path),))
         patches = []
-        for number, arrays in enumerate(load_patch_arrays(path, ("coefficients",), ("pressure",))):
+        for number, arrays in enumerate(load_patch_arrays(path, ("coefficients",), MORE)):
             degrees, *knots, coefficients = (arrays[name] for name in ARRAYS)
-            patches.append(_checked(f"{path}: patch {number}", degrees, knots, coefficients, arrays.get("pressure")))
+            patches.append(_checked(f"{path}: patch {number}", degrees, knots, coefficients, arrays))
         return BodyField(tuple(patches))
 
 
-def _pressure_of(field: SplineField) -> dict[str, Array]:
-    """Return the array of a field's pressure by its name in a file; none without a pressure."""
-    return {} if field.pressure is None else {"pressure": field.pressure}
+def _more_of(field: SplineField) -> dict[str, Array]:
+    """Return the arrays of a field's pressure and state by their names in a file; none for what it has not."""
+    return {name: values for name in MORE if (values := getattr(field, name)) is not None}
 
 
 def _checked(
-    place: str, degrees: Array, knots: Sequence[Array], coefficients: Array, pressure: Array | None
+    place: str, degrees: Array, knots: Sequence[Array], coefficients: Array, others: Mapping[str, Array]
 ) -> SplineField:
-    """Return the field of a file. Raises ValueError, which begins with the place in the file."""
-    for name, values in (("coefficients", coefficients), ("pressure", pressure)):
-        if values is not None and (values.dtype.kind != "f" or not np.all(np.isfinite(values))):
+    """Return the field of a file, whose pressure and state are among other arrays, if it has them.
+
+    Raises ValueError, which begins with the place in the file.
+    """
+    more: dict[str, Any] = {name: others[name] for name in MORE if name in others}
+    for name, values in {"coefficients": coefficients, **more}.items():
+        if values.dtype.kind != "f" or not np.all(np.isfinite(values)):
             raise ValueError(f"{place}: {name} must be finite numbers")
     try:
         (p_u, p_v, p_w), (k_u, k_v, k_w) = degrees.tolist(), knots
-        return SplineField((p_u, p_v, p_w), (k_u, k_v, k_w), coefficients, pressure=pressure)
+        return SplineField((p_u, p_v, p_w), (k_u, k_v, k_w), coefficients, **more)
     except (TypeError, ValueError) as error:
         raise ValueError(f"{place}: {error}") from None
 

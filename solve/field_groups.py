@@ -34,6 +34,8 @@ class FieldGroup:
         That of the first patch, whose law is the law of all; None where it is unknown.
     has_pressure : bool
         Whether the last column is a pressure.
+    states : int
+        Number of the columns before it that are internal variables of the law.
     gradients : SplineStack, optional
         The gradients in space that quantities take, three columns a component; by default those of the functions.
     """
@@ -43,6 +45,7 @@ class FieldGroup:
     values: SplineStack
     problem: BoundaryValueProblem | None
     has_pressure: bool = False
+    states: int = 0
     gradients: SplineStack | None = None
 
     def __len__(self) -> int:
@@ -55,9 +58,14 @@ class FieldGroup:
         return replace(self, numbers=self.numbers[rows], maps=maps, values=values, gradients=gradients)
 
     def function_on(self, u: Array, v: Array, w: Array) -> Array:
-        """Return the functions (k, len(u), len(v), len(w), c) on a tensor grid of parameters, without a pressure."""
+        """Return the functions (k, len(u), len(v), len(w), c) on a tensor grid: their components alone."""
         values = self.values.grid(u, v, w)
-        return values[..., :-1] if self.has_pressure else values
+        return values[..., : values.shape[-1] - self.more]
+
+    @property
+    def more(self) -> int:
+        """Return the number of columns of a state and a pressure."""
+        return self.states + self.has_pressure
 
     def points_on(self, u: Array, v: Array, w: Array) -> Points:
         """Return the points (3, k, len(u), len(v), len(w)) of the patches on a tensor grid of parameters."""
@@ -85,7 +93,8 @@ def _divided(
     laws = _laws([problems[number] for number in maps.numbers.tolist()])
     for row, (number, law) in enumerate(zip(maps.numbers.tolist(), laws, strict=True)):
         own = patches[number]
-        members[own.degrees, own.pressure is None, *(knots.tobytes() for knots in own.knots), law].append(row)
+        parts = own.pressure is None, own.state is None
+        members[own.degrees, *parts, *(knots.tobytes() for knots in own.knots), law].append(row)
     stack = maps.stack
     found = []
     for rows in members.values():
@@ -93,7 +102,8 @@ def _divided(
         own = [patches[number] for number in numbers.tolist()]
         values = SplineStack(own[0].degrees, own[0].knots, np.stack([patch.columns for patch in own]))
         problem, has_pressure = problems[int(numbers[0])], own[0].pressure is not None
-        found.append(FieldGroup(numbers, stack.take(np.array(rows)), values, problem, has_pressure))
+        states = 0 if own[0].state is None else own[0].state.shape[-1]
+        found.append(FieldGroup(numbers, stack.take(np.array(rows)), values, problem, has_pressure, states))
     return found
 
 

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from numbers import Integral, Real
-from typing import Any, Self
+from typing import Any, Protocol, Self
 
 from parameterize.threads import default_threads
 
@@ -15,6 +16,16 @@ from .forms.boundary_value_problem import BoundaryValueProblem
 
 DEVICES = ("cpu", "cuda")
 FORMULATIONS = ("mixed", "displacement")
+
+
+class KeptSteps(Protocol):
+    """Describe where load steps are kept, so that an interrupted solve goes on after the last one."""
+
+    def save(self, arrays: Mapping[str, Any], state: Mapping[str, Any]) -> None:
+        """Keep arrays and a state of plain JSON values, in the place of those before."""
+
+    def load(self) -> tuple[Mapping[str, Any], Mapping[str, Any]] | None:
+        """Return what was kept last; None for nothing."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -62,6 +73,8 @@ class SolveOptions(IterationOptions):
     comm: Any = None
     formulation: str | None = None
     ask: tuple[Ask, ...] = ()
+    load_steps: int = 10
+    keep: KeptSteps | None = None
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -70,6 +83,8 @@ class SolveOptions(IterationOptions):
             raise ValueError(f"formulation must be one of {', '.join(FORMULATIONS)}, got {self.formulation!r:.80}")
         if not (self.grading is None or isinstance(self.grading, Grading)):
             raise ValueError(f"grading must be a Grading, such as Grading.of(body), got {self.grading!r:.80}")
+        if not (isinstance(self.load_steps, Integral) and self.load_steps >= 1):
+            raise ValueError(f"load_steps must be a whole number, at least 1, got {self.load_steps!r:.80}")
         if self.threads is not None and self.threads < 1:
             raise ValueError(f"threads must be at least 1, got {self.threads}; leave it out for {default_threads()}")
 

@@ -8,7 +8,7 @@ slowly than the spline: a stress is less accurate than the displacement.
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, fields, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -29,6 +29,23 @@ SAMPLES = 2**16  # of a search for all extremes, where one a span is not more
 _CANDIDATES = 8  # samples around which they are refined
 _ZOOMS = 20  # steps of this, each halving the box
 _POINTS = 2**16  # evaluated at once
+
+
+class Beside(NamedTuple):
+    """State which columns a function has beside its values: so many internal variables, then perhaps a pressure."""
+
+    states: int
+    has_pressure: bool
+
+    @classmethod
+    def of(cls, group: FieldGroup) -> "Beside":
+        """Return those of a group."""
+        return cls(group.states, group.has_pressure)
+
+    @property
+    def columns(self) -> int:
+        """Return the number of these columns."""
+        return self.states + self.has_pressure
 
 
 @dataclass(frozen=True)
@@ -126,7 +143,7 @@ def _values(field: SplineField, quantity: Quantity, where: Array) -> Array:
         np.moveaxis(slopes, 0, -1),
         np.moveaxis(volume.jacobian(where), 0, -1),
         Points.at(np.ascontiguousarray(volume(where).T), where),
-        field.pressure is not None,
+        Beside(0 if field.state is None else field.state.shape[-1], field.pressure is not None),
     )
 
 
@@ -148,10 +165,10 @@ def group_values(group: FieldGroup, quantity: Quantity, u: Array, v: Array, w: A
     """Return a quantity (..., k, n_u, n_v, n_w) on a grid of each of k patches."""
     values, x = np.moveaxis(group.values.grid(u, v, w), -1, 0), group.points_on(u, v, w)
     if group.gradients is not None:
-        return _found(quantity, values, _in_rows(group.gradients.grid(u, v, w)), x, group.has_pressure)
+        return _found(quantity, values, _in_rows(group.gradients.grid(u, v, w)), x, Beside.of(group))
     slopes, jacobian = group.values.grid_slopes(u, v, w), group.maps.grid_slopes(u, v, w)
     slopes, jacobian = (np.moveaxis(part, (-2, -1), (0, 1)) for part in (slopes, jacobian))
-    return _evaluated(quantity, values, slopes, jacobian, x, group.has_pressure)
+    return _evaluated(quantity, values, slopes, jacobian, x, Beside.of(group))
 
 
 def _in_rows(gradients: Array) -> Array:
@@ -159,28 +176,30 @@ def _in_rows(gradients: Array) -> Array:
     return np.moveaxis(gradients, -1, 0).reshape(-1, 3, *gradients.shape[:-1])
 
 
-def _evaluated(quantity: Quantity, u: Array, slopes: Array, jacobian: Array, x: Points, has_pressure: bool) -> Array:
+def _evaluated(quantity: Quantity, u: Array, slopes: Array, jacobian: Array, x: Points, more: Beside) -> Array:
     """Return a quantity (..., shape) from u (c, shape), slopes (c, 3, shape) in the parameters, and J (3, 3, shape).
 
     Arguments and errors are those of `_found`.
     """
-    slopes = slopes[:-1] if has_pressure else slopes
+    slopes = slopes[: len(slopes) - more.columns]
     cofactors, det = cofactors_and_determinants(np.ascontiguousarray(jacobian).reshape(3, 3, -1))
     if not det.all():
         raise np.linalg.LinAlgError("Singular matrix")
     # grad_a = sum_b slope_b dU_b / dx_a, the inverse of J being the transposed cofactors over det J
     grad = np.einsum("cbm,abm->cam", slopes.reshape(len(slopes), 3, -1), cofactors) / det
-    return _found(quantity, u, grad.reshape(slopes.shape), x, has_pressure)
+    return _found(quantity, u, grad.reshape(slopes.shape), x, more)
 
 
-def _found(quantity: Quantity, u: Array, grad: Array, x: Points, has_pressure: bool) -> Array:
+def _found(quantity: Quantity, u: Array, grad: Array, x: Points, more: Beside) -> Array:
     """Return a quantity (..., shape) from u (c, shape) and its gradient (c, 3, shape) at points.
 
-    has_pressure: whether the last component of u is a pressure, which the points x take to the quantity; it has no
-    gradient. Raises ValueError for a function that fails or does not return numbers of the points' shape.
+    more: what the last components of u are instead, which the points x take to the quantity; they have no gradient.
+    Raises ValueError for a function that fails or does not return numbers of the points' shape.
     """
-    if has_pressure:
+    if more.has_pressure:
         u, x.pressure = u[:-1], u[-1]
+    if more.states:
+        u, x.state = u[: -more.states], u[-more.states :]
     try:
         found = np.asarray(quantity(u, grad, x), dtype=np.float64)
     except (TypeError, LookupError, AttributeError, ArithmeticError) as error:
@@ -355,10 +374,10 @@ def at_places(group: FieldGroup, quantity: Quantity, owners: IntArray, where: Ar
     u = np.moveaxis(group.values.at(owners, where), 0, -1)
     x = Points.at(np.ascontiguousarray(group.maps.at(owners, where).T), where)
     if group.gradients is not None:
-        return _found(quantity, u, _in_rows(group.gradients.at(owners, where)), x, group.has_pressure)
+        return _found(quantity, u, _in_rows(group.gradients.at(owners, where)), x, Beside.of(group))
     slopes, jacobian = group.values.slopes_at(owners, where), group.maps.slopes_at(owners, where)
     slopes, jacobian = (np.moveaxis(part, 0, -1) for part in (slopes, jacobian))
-    return _evaluated(quantity, u, slopes, jacobian, x, group.has_pressure)
+    return _evaluated(quantity, u, slopes, jacobian, x, Beside.of(group))
 
 
 def _peak(groups: Sequence[FieldGroup], best: _Candidates, row: int) -> tuple[float, Place, Place]:

@@ -1,7 +1,7 @@
 """Defines Solution, the spline that a solve returns, and SolveReport, its numbers."""
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
@@ -42,6 +42,38 @@ NORMS = {  # name in report.json -> name as shown
 def _known(part: str, norm: str) -> property:
     """Return a property for a norm of a report's errors or estimate, None where the norm is unknown."""
     return property(lambda report: getattr(getattr(report, part), norm, None))
+
+
+@dataclass(frozen=True)
+class LoadStep:
+    """Hold the numbers of one load step that is in equilibrium.
+
+    Attributes
+    ----------
+    factor : float
+        The share of the load.
+    iterations : int
+        Newton steps.
+    displacement : float
+        The largest coefficient of the displacement, which is near to the largest displacement.
+    plastic_strain : float or None
+        The largest equivalent plastic strain at a Gauss point; None for a law without one.
+
+    Examples
+    --------
+    >>> from solve.solution import LoadStep
+    >>> LoadStep(0.5, 3, 0.01).as_dict()
+    {'factor': 0.5, 'iterations': 3, 'displacement': 0.01}
+    """
+
+    factor: float
+    iterations: int
+    displacement: float
+    plastic_strain: float | None = None
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the entry of report.json."""
+        return {name: value for name, value in asdict(self).items() if value is not None}
 
 
 @dataclass(frozen=True)
@@ -86,6 +118,10 @@ class SolveReport:
         "mixed" for displacement and pressure of a nearly incompressible body, otherwise "displacement".
     asked : tuple of Answer
         The asked quantities, in the order of the asks.
+    load_steps : tuple of LoadStep
+        The load steps of a law that is not linear, up to the last one that is in equilibrium.
+    interrupted : bool
+        Whether the user, or the clock, interrupted the load steps.
 
     Examples
     --------
@@ -113,6 +149,8 @@ class SolveReport:
     formulation: str = "displacement"
     memory: tuple[float, ...] = ()
     asked: tuple[Answer, ...] = ()
+    load_steps: tuple[LoadStep, ...] = ()
+    interrupted: bool = False
 
     l2 = _known("errors", "l2")
     l2_relative = _known("errors", "l2_relative")
@@ -122,6 +160,11 @@ class SolveReport:
     error_estimate_relative = _known("estimate", "l2_relative")
     error_estimate_energy_relative = _known("estimate", "energy_relative")
 
+    @property
+    def load_factor(self) -> float | None:
+        """Return the share of the load that is in equilibrium with the solution; None without load steps."""
+        return self.load_steps[-1].factor if self.load_steps else None
+
     def as_dict(self) -> dict[str, Any]:
         """Return the entry of report.json; unknown errors are absent."""
         names = ("elements", "dofs", "h", *NORMS, "iterations", "converged", "residual", "meaningful", "seconds")
@@ -129,6 +172,8 @@ class SolveReport:
         found |= {name: value for name in names if (value := getattr(self, name)) is not None}
         found |= self.balance.as_dict() if self.balance and self.balance.is_told else {}
         found |= {} if self.formulation == "displacement" else {"formulation": self.formulation}
+        if self.load_steps:
+            found |= {"load_factor": self.load_factor, "load_steps": [step.as_dict() for step in self.load_steps]}
         found |= {"traffic": dict(self.traffic)} if self.traffic else {}
         return found | ({"memory_mb": list(self.memory)} if self.memory else {})
 
@@ -168,7 +213,7 @@ class PatchSolution(SplineField):
     @property
     def field(self) -> SplineField:
         """Return the spline alone, as a datum for another problem on the same volume."""
-        return SplineField(self.degrees, self.knots, self.coefficients, self.geometry, self.pressure)
+        return SplineField(self.degrees, self.knots, self.coefficients, self.geometry, self.pressure, self.state)
 
     def quantity(self, what: str | Quantity, points: ArrayLike) -> Array:
         """Return a quantity (m, ...) at parameters (m, 3); `what` as in `Solution.quantity`."""
@@ -234,7 +279,7 @@ class Solution(BodyField, Shown):
         body = field.on_body
         parts = zip(field.patches, body, problems, strict=True)
         patches = (
-            PatchSolution(one.degrees, one.knots, one.coefficients, volume, one.pressure, problem=own)
+            PatchSolution(one.degrees, one.knots, one.coefficients, volume, one.pressure, one.state, problem=own)
             for one, volume, own in parts
         )
         return cls(tuple(patches), body, report, problem)

@@ -13,10 +13,13 @@ from .discretization.grading import Grading
 from .discretization.on_regions import demand_area, demand_supports
 from .discretization.parted import shared_unknowns
 from .discretization.quadrature import gauss_rule, map_planes
+from .equilibrium import laws_of_faces
 from .forms.boundary_value_problem import BoundaryValueProblem
 from .forms.elasticity import Elasticity
+from .forms.nonlinear_body import NonlinearBody
 from .forms.poisson import Poisson
 from .forms.problem import Problem
+from .load_path import along_the_load
 from .options import SolveOptions, check_device
 from .preparation import discretized, on_patches
 from .solution import Solution
@@ -72,6 +75,12 @@ def solve_problem(body: BodyLike, problem: Poisson | Elasticity | Problem, **how
     ask : Ask or str, or a list of these
         Quantities to answer, each with an interval, such as "ux at (10, 0, 0)", "von_mises max over z > 20", "mean T
         over nz > 0.9", "reaction z of u0", "flow over u1" and "energy": `solution.answers`.
+    load_steps : int
+        For a law that is not linear, such as `Plasticity` and `NeoHookean`: number of equal steps in which loads and
+        given displacements grow; 10 by default. A step that has no solution is halved, and where halving ends, so does
+        the load: `report.load_factor` is the share that the body carries, and `report.converged` is False.
+    keep : object, optional
+        Where the load steps are kept, with methods `save` and `load`: an interrupted solve goes on after the last one.
     strict : bool
         Whether a failure of the linear solver raises ConvergenceError; otherwise `report.converged` is False. A failure
         before the first iteration leaves no solution, and always raises ConvergenceError.
@@ -107,6 +116,8 @@ def solve_problem(body: BodyLike, problem: Poisson | Elasticity | Problem, **how
 def solve_with(body: BodyLike, problem: BoundaryValueProblem, options: SolveOptions) -> Solution:
     """Return the solution of `solve_problem` for options in one object."""
     check_device(options.device, problem)
+    if isinstance(problem, NonlinearBody):
+        return along_the_load(body, problem, options)
     functionals = [functional(ask, problem, body) for ask in options.ask]
     system = discretized(body, problem, options)
     solution = system.solve_with(options)
@@ -169,7 +180,8 @@ def check_problem(body: BodyLike, problem: BoundaryValueProblem, comm: Any = Non
     problem.demand_held()
     options = SolveOptions(threads=1, quadrature="gauss", comm=comm)
     glued = as_body(body)
-    _, patches = on_patches(glued, problem, options)
+    placed, patches = on_patches(glued, problem, options)
+    patches = laws_of_faces(placed, patches)
     unknowns = shared_unknowns(glued, [patch.space for patch in patches], comm)
     own = [patches[number] for number in unknowns.patches]
     found = assemble_body_data(own, options, unknowns)

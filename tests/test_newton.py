@@ -240,7 +240,6 @@ def test_data_on_regions_give_the_solution_of_a_bar(conditions):
         ({"value": {"u0": 0}, "exchange": {"x > 9": (1, 2)}}, "exchange 'x > 9': no part of the boundary lies there"),
         ({"value": "u0", "conditions": [iga_nn.Flux("nx < -0.99", 1)]}, "flux 'nx < -0.99' acts where value 'u0'"),
         ({"conditions": [iga_nn.Flux("u0", 1), iga_nn.Flux("u1", -1)]}, "fluxes alone do not determine the solution"),
-        ({"value": {"u0": 0, "x > 3.99": 1}}, "value 'x > 3.99': newton holds all of u on whole faces"),
     ],
 )
 def test_data_on_regions_that_are_not_taken_are_refused(conditions, says):

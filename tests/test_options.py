@@ -10,7 +10,9 @@ from iga_nn.errors import InputError
 from iga_nn.options import (
     PROBLEMS,
     ElasticityOptions,
+    FiniteOptions,
     MapOptions,
+    PlasticOptions,
     PoissonOptions,
     StudyOptions,
     WorkerOptions,
@@ -21,7 +23,26 @@ NOT_TOLD = {"unit", "stress_unit", "solve_anyway"}  # but to the reader, and to 
 SPACE = {"refine": (2,), "degree": 2, "quadrature": "gauss", "ask": ("energy",), "accuracy": "1%"}
 SCALAR = dict.fromkeys(("exact", "source", "boundary", "kappa", "reaction"), "1")
 VECTOR = dict.fromkeys(("exact", "body_force", "displacement"), "1;1;1")
+REFUSED = {"exact": "1;1;1", "ask": ("energy",), "accuracy": "1%"} | dict.fromkeys(
+    ("shear", "c10", "c01", "c20", "c30"), 7.0
+)
+BODY = (
+    {"fix": ("x < 1",), "roller": ("x < 1",), "body_force": "1;1;1"}
+    | {"symmetry": ("x < 1",), "load": ("x < 1=1;1;1",), "pressure": ("x < 1=1",), "spring": ("x < 1=1",)}
+    | dict.fromkeys(("total_spring", "foundation"), ("x < 1=1",))
+    | dict.fromkeys(("total_force", "moment", "bearing"), ("x < 1=1;1;1",))
+    | dict.fromkeys(("turn", "hydrostatic", "remote_force"), ("x < 1=1;1;1 at (0, 0, 1)",))
+    | {"density": 2.0, "gravity": "0;1;0", "acceleration": "1;0;0", "spin": "0;0;1 at (0, 0, 0)"}
+)
+STEPS = BODY | {"refine": (2,), "degree": 2, "quadrature": "gauss", "steps": 3}
+LOADED = {"body_force": "2;2;2", "density": 1.0, "gravity": "0;0;1", "fix": ("y < 1",)}
 OTHERS = {
+    PlasticOptions(**LOADED): STEPS | {"young": 2.0, "poisson_ratio": 0.2, "yield_stress": 3.0, "hardening": 1.0},
+    FiniteOptions(**LOADED): STEPS | {"shear": 2.0, "bulk": 9.0},
+    FiniteOptions(**LOADED, material="mooney-rivlin", c10=1.0): STEPS
+    | {"c10": 2.0, "c01": 1.0, "bulk": 9.0, "material": "yeoh"},
+    FiniteOptions(**LOADED, material="yeoh", c10=1.0): STEPS
+    | {"c10": 2.0, "c20": 1.0, "c30": 1.0, "bulk": 9.0, "material": "mooney-rivlin"},
     PoissonOptions(source="2"): SPACE
     | SCALAR
     | {"neumann": ("u1=1",), "robin": ("u1=1:1",), "value": ("x < 1=1",), "flux": ("x < 1=1",)}
@@ -29,12 +50,7 @@ OTHERS = {
     ElasticityOptions(body_force="2;2;2", density=1.0, gravity="0;0;1"): SPACE
     | VECTOR
     | {"traction": ("u1=1;1;1",), "young": 2.0, "poisson_ratio": 0.25, "formulation": "mixed"}
-    | {"fix": ("x < 1",), "roller": ("x < 1",)}
-    | {"symmetry": ("x < 1",), "load": ("x < 1=1;1;1",), "pressure": ("x < 1=1",), "spring": ("x < 1=1",)}
-    | dict.fromkeys(("total_spring", "foundation"), ("x < 1=1",))
-    | dict.fromkeys(("total_force", "moment", "bearing"), ("x < 1=1;1;1",))
-    | dict.fromkeys(("turn", "hydrostatic", "remote_force"), ("x < 1=1;1;1 at (0, 0, 1)",))
-    | {"density": 2.0, "gravity": "0;1;0", "acceleration": "1;0;0", "spin": "0;0;1 at (0, 0, 0)"},
+    | BODY,
 }
 
 
@@ -46,7 +62,10 @@ def told(options):
 @pytest.mark.parametrize(("options", "others"), OTHERS.items(), ids=lambda given: getattr(given, "section", ""))
 def test_every_option_of_a_problem_is_told_to_the_solver(options, others):
     for field in fields(options):
-        if field.name not in NOT_TOLD:
+        if field.name in REFUSED and field.name not in others:
+            with pytest.raises(InputError, match=f"--{field.name}: "):
+                told(replace(options, **{field.name: REFUSED[field.name]}))
+        elif field.name not in NOT_TOLD | ({"material"} - set(others)):
             assert told(replace(options, **{field.name: others[field.name]})) != told(options), field.name
 
 

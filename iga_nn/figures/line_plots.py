@@ -9,8 +9,11 @@ from matplotlib import colormaps
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from solve.solution import LoadStep
+
 from ..level_table import Study
-from .colors import FACE_COLORS
+from ..options import NO_UNITS, Units
+from .colors import FACE_COLORS, with_unit
 from .style import blank, positive, save
 
 TERMS = {  # of the loss, as parameterize names them
@@ -93,6 +96,20 @@ def draw_study(path: Path | None, study: Study) -> Figure:
         panel.grid(alpha=0.3)
         panel.margins(x=0.12, y=0.08)
     panels[0].legend(frameon=False)
+    return save(figure, path)
+
+
+def draw_load_steps(path: Path | None, steps: Sequence[LoadStep], units: Units = NO_UNITS) -> Figure:
+    """Draw the share of the load over the largest displacement, a point for each load step, from rest on."""
+    figure, axes = blank(1, 1, (7, 5))
+    moved, shares = ([0.0, *(getattr(step, name) for step in steps)] for name in ("displacement", "factor"))
+    axes.plot(moved, shares, "o-", color=FACE_COLORS[0], markersize=4.0)
+    axes.axhline(1.0, color="grey", linewidth=0.7, linestyle=":")
+    axes.set_xlabel(with_unit("largest displacement", units.displacement))
+    axes.set_ylabel("share of the load")
+    axes.set_xlim(left=0.0)
+    axes.set_ylim(bottom=0.0)
+    axes.grid(alpha=0.3)
     return save(figure, path)
 
 

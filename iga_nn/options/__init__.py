@@ -3,8 +3,10 @@
 from .analysis import ModesOptions as ModesOptions
 from .analysis import StudyOptions as StudyOptions
 from .elasticity import ElasticityOptions as ElasticityOptions
+from .finite import FiniteOptions as FiniteOptions
 from .mapping import MapOptions as MapOptions
 from .mapping import SurfaceOptions as SurfaceOptions
+from .plastic import PlasticOptions as PlasticOptions
 from .poisson import PoissonOptions as PoissonOptions
 from .problem import NO_UNITS as NO_UNITS
 from .problem import UNITS as UNITS

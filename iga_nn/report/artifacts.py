@@ -78,6 +78,7 @@ ARTIFACTS = (  # in the order of the pages
     Artifact(REGIONS, "solution", "where data are given", "regions.draw_conditions", ("volume", "conditions")),
     Artifact("named_faces.png", "solution", "the volume's faces by name", "map.draw_faces", ("named_volume",)),
     Artifact("convergence.png", "solution", "errors over the mesh size", "line_plots.draw_study", ("levels",)),
+    Artifact("load.png", "solution", "load over displacement", "line_plots.draw_load_steps", ("load_steps", "units")),
     Artifact("error.png", "solution", "error on the boundary and on three sections", "solution.draw_error", _ERROR),
     Artifact("modes.png", "modes", "the first modes, by frequency", "solution.draw_modes", ("volume", "modes")),
     Artifact(

@@ -16,6 +16,8 @@ SAYINGS = {  # quantity -> its words, the extreme that they name, and the sectio
     "u": ("u at least", "least", ""),
     "magnitude": ("largest displacement", "largest", "unit"),
     "von_mises": ("von Mises at most", "largest", "stress_unit"),
+    "plastic_strain": ("equivalent plastic strain at most", "largest", ""),
+    "volume_ratio": ("ratio of volumes J at least", "least", ""),
     "first_principal": ("largest principal stress", "largest", "stress_unit"),
     "third_principal": ("smallest principal stress", "least", "stress_unit"),
     "gradient_magnitude": ("|gradient| at most", "largest", ""),

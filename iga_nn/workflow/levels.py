@@ -14,7 +14,7 @@ from solve.discretization.error_norms import Errors
 from solve.field import BodyField
 from solve.forms.boundary_value_problem import BoundaryValueProblem
 from solve.reactions import Balance
-from solve.solution import Solution
+from solve.solution import LoadStep, Solution
 
 from ..io.solutions import SOLUTION, VOLUME, solution_on
 from ..options import UNITS, ProblemOptions
@@ -129,5 +129,6 @@ def _report(values: dict[str, Any]) -> SolveReport:
     if balance := values["balance"]:
         reactions = {name: tuple(row) for name, row in balance["reactions"].items()}
         given["balance"] = Balance(**balance | {"load": tuple(balance["load"]), "reactions": reactions})
+    given["load_steps"] = tuple(LoadStep(**step) for step in values["load_steps"])
     given["asked"] = tuple(Answer(**entry | {"at": entry["at"] and tuple(entry["at"])}) for entry in values["asked"])
     return SolveReport(**given)

@@ -15,6 +15,7 @@ from parameterize.time_limit import OutOfTime, closing, cut_short
 from solve import ConvergenceRow, Modes, Solution, SolveOptions, SolveReport, rates
 from solve.forms.boundary_value_problem import BoundaryValueProblem
 from solve.forms.frame import UnitFrame
+from solve.load_path import InterruptedPath
 
 from ..errors import InputError, expected_errors, input_errors, one_line
 from ..figures.fields import NAMED
@@ -68,7 +69,7 @@ def solve_levels(
                         solution.save(state.folder / SOLUTION)
                         done.add(level, entry, solution)
                         state.write(**{problem_options.section: section_of(problem_options, problem, body, done)})
-                        if kept and is_finite(solution):
+                        if kept and is_finite(solution) and not solution.report.interrupted:
                             kept.save(done)
         except OutOfTime as error:
             cut_short("the levels of the solve")
@@ -176,6 +177,9 @@ def each_level(
         try:
             with input_errors():
                 solution = problem_options.solved(body, problem, replace(options, refine=level), steps)
+        except InterruptedPath as error:
+            yield error.solution  # of the last load step
+            raise error.cause from None
         except MemoryError:
             remedy = "free some, lower --refine, or share the solve: mpiexec -n 4 iga-nn solve ... --mpi"
             raise InputError(f"refine {level}: the memory does not suffice; {remedy}") from None
@@ -250,6 +254,8 @@ def _draw(state: RunFolder, body: BodyLike, done: Levels, problem: BoundaryValue
         if len(done.reports) > 1:
             rows = [ConvergenceRow(report, None, None) for report in done.reports]
             known["levels"] = {max(max(field.degrees) for field in done.finest.patches): rows}
+    if steps := done.reports[-1].load_steps:
+        known["load_steps"] = steps
     if problem.conditions:
         known["conditions"] = (problem.placed(UnitFrame.of(body)) if problem.is_scaled else problem).conditions
     state.draw("solution", **known)

@@ -1,12 +1,14 @@
 """Computes the forces of a law that is not linear, and their derivative, a matrix stored at the quadrature points."""
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from scipy.sparse import csr_array
 
 from parameterize.arrays import Array, IntArray
+from parameterize.spline.bspline import collocation
 
 from ..field import Points
 from ..forms.form import ROUNDING, Form, reaction
@@ -24,13 +26,14 @@ class StackForces:
     """Compute the forces of any law on the patches of a stack.
 
     group: the number of the group that the patches belong to. places: (k,), their places in it. forms: the law of each
-    patch.
+    patch. state: (k, q_u, history, q_w, q_v), the internal variables at the points, where the laws have a history.
     """
 
     stack: PatchStack
     group: int
     places: IntArray
     forms: Sequence[Form]
+    state: Array | None = None
 
     def add(self, coefficients: Array, result: Array) -> None:
         """Add the forces for coefficients (patches, c, n_u, n_v, n_w) of the group to a result of that shape."""
@@ -64,12 +67,38 @@ class StackForces:
             for q, rows, size, fields, gradient, x in self._planes(piece, coefficients):
                 pull = np.zeros((len(patches), 4, 4, *plane))  # from u and its parametric derivatives to u and gradient
                 pull[:, 0, 0], pull[:, 1:, 1:] = np.sqrt(size), rows
-                law = derivative(self.forms[patches[0]], of_law(fields[:, :, 0]), of_law(gradient), np.asarray(x))
+                law = derivative(self.forms[patches[0]], of_law(fields[:, :, 0]), of_law(gradient), x)
                 half = np.einsum("mcidjwv,mbjwv->mcidbwv", of_patches(law, size), pull)
                 factors[patches, q] = np.einsum("maiwv,mcidbwv->mcadbwv", pull, half)
 
         self.stack.on_pieces(fill)
         return factors
+
+    def advanced(self, coefficients: Array) -> "StackForces":
+        """Return the forces with the internal variables at the end of a load step, of a law with a history."""
+        count = self.forms[0].history
+        state = np.empty((len(self.stack), self.stack.shape[0], count, *self.stack.plane_shape))
+
+        def fill(piece: Piece) -> None:
+            patches, _ = piece
+            for q, _, size, _, gradient, x in self._planes(piece, coefficients):
+                state[patches, q] = of_patches(self.forms[patches[0]].advanced(of_law(gradient), x), size)
+
+        self.stack.on_pieces(fill)
+        return replace(self, state=state)
+
+    def fitted(self) -> Array:
+        """Return the coefficients (k, history, n_u, n_v, n_w) of splines that fit the internal variables best."""
+        assert self.state is not None
+        found = np.moveaxis(self.state, 2, 1)  # (k, history, q_u, q_w, q_v)
+        parts = []
+        for own, rule, space in zip(found, self.stack.rules, self.stack.spaces, strict=True):
+            u, v, w = (
+                np.linalg.pinv(collocation(knots, degree, points).toarray())
+                for knots, degree, points in zip(space.knots, space.degrees, rule.points, strict=True)
+            )
+            parts.append(np.einsum("aq,hqrs,cr,bs->habc", u, own, w, v, optimize=True))
+        return np.stack(parts)
 
     def _planes(self, piece: Piece, source: Array) -> Iterator[tuple[int, Array, Array, Array, Array, Points]]:
         """Yield for every point q of u: q, rows R, w |det J|, fields, gradients, and the points in space.
@@ -85,6 +114,8 @@ class StackForces:
             group_kernels.evaluate_splines(source, which, kinds, q, self.stack.tables, fields)
             group_kernels.turn_fields(rows, fields[:, :, 1:], gradient, False)
             size = np.abs(measure)
+            if self.state is not None:
+                x.state = of_law(self.state[patches, q])
             yield q, rows, size, fields, gradient / np.sqrt(size)[:, None, None], x
 
 
@@ -92,20 +123,42 @@ class StackForces:
 class Forces:
     """Compute the integrals of flux : grad v + react . v of any law on all patches, with the terms on faces.
 
-    matrix: of a simple law, whose stacks, rules and terms on faces are used. forms: the law of each patch.
+    matrix: of a simple law, whose stacks, rules and terms on faces are used. forms: the law of each patch. states: the
+    internal variables of each stack; () at rest, and of laws without a history.
     """
 
     matrix: BodyMatrix
     forms: Sequence[Form]
+    states: Sequence[Array] = ()
 
     @cached_property
     def stacks(self) -> list[StackForces]:
         """Return the forces on each stack."""
-        groups = self.matrix.layout.groups
+        groups, stacks = self.matrix.layout.groups, self.matrix.every_stack
+        states: Sequence[Array | None] = self.states or [None] * len(stacks)
         return [
-            StackForces(stack, number, places, [self.forms[groups[number][i]] for i in places])
-            for stack, number, places in self.matrix.every_stack
+            StackForces(stack, number, places, [self.forms[groups[number][i]] for i in places], state)
+            for (stack, number, places), state in zip(stacks, states, strict=True)
         ]
+
+    def advanced(self, coefficients: OnPatches) -> "Forces":
+        """Return the forces with the internal variables at the end of a load step; themselves without a history."""
+        if not self.forms[0].history:
+            return self
+        groups = list(coefficients.in_groups)
+        states = [own.advanced(groups[own.group]).state for own in self.stacks]
+        found = replace(self, states=[state for state in states if state is not None])
+        found.__dict__["of_faces"] = self.of_faces
+        return found
+
+    def fitted(self) -> list[Array | None]:
+        """Return the coefficients (history, n_u, n_v, n_w) of the internal variables of each patch, None at rest."""
+        found: list[Array | None] = [None] * len(self.forms)
+        for own in self.stacks if self.states else ():
+            numbers = [self.matrix.layout.groups[own.group][i] for i in own.places]
+            for number, fit in zip(numbers, own.fitted(), strict=True):
+                found[number] = fit
+        return found
 
     def apply(self, coefficients: OnPatches) -> OnPatches:
         """Return the forces for all coefficients."""
@@ -113,8 +166,18 @@ class Forces:
         groups = list(zip(coefficients.in_groups, result.in_groups, strict=True))
         for own in self.stacks:
             own.add(*groups[own.group])
-        self.matrix.add_faces(coefficients, result)
+        self.add_faces(coefficients, result)
         return result
+
+    def add_faces(self, coefficients: OnPatches, result: OnPatches) -> None:
+        """Add the products of the terms on faces, which are linear, to a result."""
+        if self.of_faces.nnz:
+            result.flat[:] += self.of_faces @ coefficients.flat
+
+    @cached_property
+    def of_faces(self) -> csr_array:
+        """Return the matrix of the terms on faces."""
+        return self.matrix.matrix_of(self.matrix.faces)
 
     def derivative(self, coefficients: OnPatches) -> "Tangent":
         """Return the derivative at some coefficients. Raises ValueError as `tangent.derivative` does."""
@@ -139,12 +202,11 @@ class Tangent:
 
     def apply(self, coefficients: OnPatches) -> OnPatches:
         """Return the products with all coefficients."""
-        matrix = self.forces.matrix
-        result = matrix.layout.empty(coefficients.components)
+        result = self.forces.matrix.layout.empty(coefficients.components)
         groups = list(zip(coefficients.in_groups, result.in_groups, strict=True))
         for own, factors in zip(self.forces.stacks, self.factors, strict=True):
             _add_products(own, factors, *groups[own.group])
-        matrix.add_faces(coefficients, result)
+        self.forces.add_faces(coefficients, result)
         return result
 
     @property

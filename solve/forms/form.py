@@ -36,6 +36,9 @@ class Form:
     constant : bool
         Whether the flux has neither u nor x in it, and there is no reaction: products are then faster, and `flux` may
         get None for x. False by default.
+    history : int
+        Number of internal variables at a point, which `x.state` (history, ...) has in `flux`, or None before the first
+        load step; `advanced` returns those at the end of a step. 0 by default.
 
     Examples
     --------
@@ -55,6 +58,7 @@ class Form:
     symmetric: bool = True
     linear: bool = True
     constant: bool = False
+    history: int = 0
 
     def flux(self, u: Any, grad: Any, x: Any) -> Any:
         """Return the flux (c, 3, ...) of u (c, ...) and its gradient (c, 3, ...) at points x (3, ...).
@@ -88,6 +92,17 @@ class Form:
         """Return half of flux : grad u + react . u, (...), whose integral is the energy 1/2 a(u, u) of the body."""
         inside = (np.asarray(self.flux(u, grad, x)) * grad).sum(axis=(0, 1))
         return 0.5 * (inside + (reaction(self, u, grad, x) * u).sum(axis=0))
+
+    def tangent(self, u: Any, grad: Any, x: Any) -> Array | None:
+        """Return the derivative (c, 4, c, 4, ...) of a law that is not linear, as `tangent.derivative` has it.
+
+        None, the default, stands for the derivative by jets.
+        """
+        return None
+
+    def advanced(self, grad: Array, x: Any) -> Array:
+        """Return the internal variables (history, ...) at the end of a load step with gradients (c, 3, ...)."""
+        raise NotImplementedError(f"{type(self).__name__} has a history and must define advanced(self, grad, x)")
 
     @property
     def caveat(self) -> str:
