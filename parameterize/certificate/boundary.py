@@ -7,7 +7,7 @@ point are searched for.
 """
 
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Protocol
 
 import numba
 import numpy as np
@@ -82,8 +82,49 @@ def check_boundary(body: BodyLike, *, max_depth: int = 24) -> BoundaryCheck:
         raise ValueError(f"max_depth must be non-negative, got {max_depth}")
     body = as_body(body)
     local = _local(body)
-    pieces = boundary_pieces(local)
-    error = _rounding(local, max_depth)
+    rest = settle(_Patches(local), boundary_pieces(local), _rounding(local, max_depth), max_depth)
+    if rest.met is not None:
+        return BoundaryCheck(False, _meeting(body, *rest.met), len(rest.pairs))
+    if len(rest.pairs):
+        left = np.unique(rest.pieces.patches[rest.pairs]).tolist()
+        return BoundaryCheck(None, None, len(rest.pairs), undecided_patches=tuple(left))
+    found = overlap(local)
+    return BoundaryCheck(None if found is None else not found, None, 0, found)
+
+
+class Surface(Protocol):
+    """The faces that pieces are parts of, as a search for a common point needs them: by number, with parameters."""
+
+    def points(self, faces: IntArray, where: Array) -> Array:
+        """Return points (k, 3) at parameters (k, 3) of faces (k,)."""
+
+    def jacobian(self, faces: IntArray, where: Array) -> Array:
+        """Return the derivatives (k, 3, 3) there, the last index that of the parameter."""
+
+    def middles(self, pieces: Pieces, rows: IntArray) -> Array:
+        """Return the parameters (k, 3) of the middle of pieces."""
+
+    def distance(self, faces: list[IntArray], where: list[Array]) -> Array:
+        """Return a lower bound (k,) of the distance of two parameters of each pair of faces; at most 1."""
+
+
+@dataclass(frozen=True, eq=False)
+class Rest:
+    """What is left of all pairs of pieces: pairs (k, 2) without a proof, and two parameters of a common point.
+
+    met: the numbers (2,) of the faces and a parameter (3,) of each; None where no common point was found.
+    """
+
+    pieces: Pieces
+    pairs: IntArray
+    met: tuple[IntArray, tuple[Array, Array]] | None = None
+
+
+def settle(surface: Surface, pieces: Pieces, error: float, max_depth: int) -> Rest:
+    """Prove that pieces meet only where they are joined, cutting them at most `max_depth` times in four.
+
+    error: a bound of the rounding error of a control point's coordinate.
+    """
     own = np.repeat(np.arange(len(pieces.nets))[:, None], 2, axis=1)
     points = as_rows(pieces.nets)
     pairs = np.concatenate([own, overlapping_boxes(points.min(axis=1) - error, points.max(axis=1) + error)])
@@ -92,16 +133,12 @@ def check_boundary(body: BodyLike, *, max_depth: int = 24) -> BoundaryCheck:
         hopeless = len(pairs) > most  # only a common point is searched for then
         pairs = pairs if hopeless else pairs[~is_proved(pieces, pairs, error)]
         if not len(pairs):
-            found = overlap(local)
-            return BoundaryCheck(None if found is None else not found, None, 0, found)
-        met = _search(local, pieces, pairs, error)
-        if met is not None:
-            return BoundaryCheck(False, _meeting(body, *met), len(pairs))
-        if hopeless or depth == max_depth:
             break
+        met = _search(surface, pieces, pairs, error)
+        if met is not None or hopeless or depth == max_depth:
+            return Rest(pieces, pairs, met)
         pieces, pairs = halved(pieces, pairs)
-    left = np.unique(pieces.patches[pairs]).tolist()
-    return BoundaryCheck(None, None, len(pairs), undecided_patches=tuple(left))
+    return Rest(pieces, pairs)
 
 
 def _local(body: Body) -> Body:
@@ -143,10 +180,12 @@ def _meeting(body: Body, patches: IntArray, where: tuple[Array, Array]) -> Meeti
     return Meeting((p, q), point, (int(patches[0]), int(patches[1])) if len(body) > 1 else None)
 
 
-def _search(local: Body, pieces: Pieces, pairs: IntArray, error: float) -> tuple[IntArray, tuple[Array, Array]] | None:
-    """Return two parameters of a common point of pieces that do not touch, and the numbers (2,) of their patches.
+def _search(
+    surface: Surface, pieces: Pieces, pairs: IntArray, error: float
+) -> tuple[IntArray, tuple[Array, Array]] | None:
+    """Return two parameters of a common point of pieces that do not touch, and the numbers (2,) of their faces.
 
-    Newton's method starts from the middle of some pairs. Beside an edge of the cube it tends to two equal parameters:
+    Newton's method starts from the middle of some pairs. Beside an edge of a face it tends to two equal parameters:
     so the gap must be rounding, and the parameters farther apart than their errors, gap / (least slope), can explain.
     """
     some = pairs[:: 1 + len(pairs) // _MOST_PAIRS[0]]
@@ -156,50 +195,57 @@ def _search(local: Body, pieces: Pieces, pairs: IntArray, error: float) -> tuple
     chosen = open_pairs[np.unique(np.linspace(0, len(open_pairs) - 1, _TRIED).astype(np.int64))]
     rows = np.arange(len(chosen))[:, None]
     tangents = [VARYING_AXES[pieces.axes[part]] for part in chosen.T]
-    patches = [pieces.patches[part] for part in chosen.T]
-    where = [_middles(local, pieces, part) for part in chosen.T]  # two (k, 3)
+    faces = [pieces.patches[part] for part in chosen.T]
+    where = [surface.middles(pieces, part) for part in chosen.T]  # two (k, 3)
     for _ in range(_NEWTON_STEPS):
-        gap = local.points(patches[0], where[0]) - local.points(patches[1], where[1])
-        slopes = _slopes(local, patches, where, tangents)
+        gap = surface.points(faces[0], where[0]) - surface.points(faces[1], where[1])
+        slopes = _slopes(surface, faces, where, tangents)
         step = np.einsum("kab,kb->ka", np.linalg.pinv(slopes, rcond=1e-9), gap)  # (k, 4)
         for side in range(2):
             where[side][rows, tangents[side]] -= step[:, 2 * side : 2 * side + 2]
             np.clip(where[side], 0.0, 1.0, out=where[side])
-    gap = np.linalg.norm(local.points(patches[0], where[0]) - local.points(patches[1], where[1]), axis=1)
-    singular = np.linalg.svd(_slopes(local, patches, where, tangents), compute_uv=False)
+    gap = np.linalg.norm(surface.points(faces[0], where[0]) - surface.points(faces[1], where[1]), axis=1)
+    singular = np.linalg.svd(_slopes(surface, faces, where, tangents), compute_uv=False)
     met = (gap < error) & (singular[:, 2] > 1e-4 * singular[:, 0])  # the surfaces cross, they do not just touch
-    distance = _distance(local, patches, where)
+    distance = surface.distance(faces, where)
     met &= (distance > 1e-6) & (distance * singular[:, 2] > _DISTINCT * (gap + error))
     if not met.any():
         return None
     best = int(np.flatnonzero(met)[0])
-    return np.array([patches[0][best], patches[1][best]]), (where[0][best], where[1][best])
+    return np.array([faces[0][best], faces[1][best]]), (where[0][best], where[1][best])
 
 
-def _slopes(body: Body, patches: list[IntArray], where: list[Array], tangents: list[IntArray]) -> Array:
+def _slopes(surface: Surface, faces: list[IntArray], where: list[Array], tangents: list[IntArray]) -> Array:
     """Return the derivative (k, 3, 4) of F(p) - F(q) in the two free parameters of each."""
     of_p, of_q = (
-        np.take_along_axis(body.jacobian(patches[k], where[k]), tangents[k][:, None], axis=2) for k in range(2)
+        np.take_along_axis(surface.jacobian(faces[k], where[k]), tangents[k][:, None], axis=2) for k in range(2)
     )
     return np.concatenate([of_p, -of_q], axis=2)
 
 
-def _distance(body: Body, patches: list[IntArray], where: list[Array]) -> Array:
-    """Return a lower bound (k,) of the distance of two parameters, in one patch or through glued faces; at most 1."""
-    direct = np.where(patches[0] == patches[1], np.abs(where[0] - where[1]).max(axis=1), 1.0)
-    glued = body.glued.reshape(len(body), 3, 2).swapaxes(1, 2)  # faces where a parameter is 0, then those where it is 1
-    to_glued = (
-        np.where(glued[own], np.stack([place, 1.0 - place], axis=1), 1.0).min(axis=(1, 2))
-        for own, place in zip(patches, where, strict=True)
-    )
-    return np.minimum(direct, sum(to_glued))
+class _Patches:
+    """The outer faces of a body, by the numbers of their patches."""
 
+    def __init__(self, body: Body) -> None:
+        self.points, self.jacobian = body.points, body.jacobian
+        self._body = body
 
-def _middles(body: Body, pieces: Pieces, rows: IntArray) -> Array:
-    """Return the parameters (k, 3) of the middle of pieces."""
-    middle = (pieces.low[rows] + pieces.high[rows]) / 2.0 ** (pieces.depth + 1)
-    patches = (body.patches[number] for number in pieces.patches[rows])
-    return np.stack([_parameters(patch, place) for patch, place in zip(patches, middle, strict=True)])
+    def distance(self, patches: list[IntArray], where: list[Array]) -> Array:
+        """Return a lower bound (k,) of the distance of two parameters, in one patch or through glued faces."""
+        direct = np.where(patches[0] == patches[1], np.abs(where[0] - where[1]).max(axis=1), 1.0)
+        count = len(self._body)
+        glued = self._body.glued.reshape(count, 3, 2).swapaxes(1, 2)  # faces where a parameter is 0, then 1
+        to_glued = (
+            np.where(glued[own], np.stack([place, 1.0 - place], axis=1), 1.0).min(axis=(1, 2))
+            for own, place in zip(patches, where, strict=True)
+        )
+        return np.minimum(direct, sum(to_glued))
+
+    def middles(self, pieces: Pieces, rows: IntArray) -> Array:
+        """Return the parameters (k, 3) of the middle of pieces."""
+        middle = (pieces.low[rows] + pieces.high[rows]) / 2.0 ** (pieces.depth + 1)
+        patches = (self._body.patches[number] for number in pieces.patches[rows])
+        return np.stack([_parameters(patch, place) for patch, place in zip(patches, middle, strict=True)])
 
 
 def _parameters(volume: BSplineVolume, place: Array) -> Array:

@@ -13,6 +13,7 @@ derivatives of a rational piece is in `_rational_differences`. Pieces may also b
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Protocol
 
 import numba
 import numpy as np
@@ -43,6 +44,13 @@ for _axis, _varying in enumerate(VARYING_AXES):
     _STEPS[_axis][:, _varying] = _CORNERS + _MIDDLES
 
 
+class PointNames(Protocol):
+    """Gives points on the faces that pieces are parts of names, see `SharedPoints`."""
+
+    def names(self, patches: IntArray, axes: IntArray, positions: IntArray, steps: int) -> IntArray:
+        """Return the names (n, m, 3) of points of faces; different points have different ones."""
+
+
 @dataclass(frozen=True, eq=False)
 class Pieces:
     """Parts of the outer faces of patches, all cut equally often: their edges are 2**-depth of a span's edges.
@@ -53,7 +61,7 @@ class Pieces:
     """
 
     depth: int
-    shared: SharedPoints
+    shared: PointNames
     patches: IntArray
     axes: IntArray
     low: IntArray
