@@ -10,13 +10,23 @@ from dataclasses import dataclass
 from fractions import Fraction
 from functools import cache
 from itertools import product
+from math import comb
 
 import numpy as np
 
 from ..arrays import Array, IntArray
 from ..spline.bernstein import add_products, cross_products, split
 from ..threads import in_parallel
-from .bezier import exact_slopes, multinomial, scales, simplex_indices, slope_matrices, slope_shapes
+from .bezier import (
+    exact_slopes,
+    multinomial,
+    net_matrix,
+    scales,
+    simplex_bernstein,
+    simplex_indices,
+    slope_matrices,
+    slope_shapes,
+)
 from .kinds import ElementKind, Triple
 
 CHUNK = 128  # elements at a time: their data fit into the cache
@@ -160,6 +170,22 @@ class ElementForm:
         """Return the corners of the eighths of pieces with corners (k, c, 3): (8 k, c, 3), exact at depths below 50."""
         weights = _eighths(self.kind.shape)
         return np.einsum("pij,kjc->kpic", weights, places, optimize=False).reshape(-1, *places.shape[1:])
+
+
+def point_at(kind: ElementKind, nodes: Array, place: Array) -> Array:
+    """Return the point (3,) of an element (nodes, 3) at parameters (3,)."""
+    u, v, w = (Fraction(x) for x in place.tolist())
+    if kind.shape == "tetra":
+        degree = kind.degrees[0]
+        weights = [simplex_bernstein(degree, row, [u, v, w]) for row in simplex_indices(degree)]
+    else:
+        rows = [
+            [comb(p, i) * x**i * (1 - x) ** (p - i) for i in range(p + 1)]
+            for x, p in zip((u, v, w), kind.degrees, strict=True)
+        ]
+        weights = [a * b * c for a, b, c in product(*rows)]
+    net = np.array([[float(x) for x in row] for row in net_matrix(kind)])
+    return np.asarray(np.array([float(x) for x in weights]) @ (net @ nodes))
 
 
 def _corners(kind: ElementKind, degree: int) -> IntArray:
