@@ -1,5 +1,7 @@
 from parameterize.certificate.certify import certify as certify
 from parameterize.config import preset as preset
+from parameterize.meshes.certify import certify_mesh as certify_mesh
+from parameterize.meshes.mesh import VolumeMesh as VolumeMesh
 from parameterize.run import Parameterization as Parameterization
 from parameterize.run import parameterize as parameterize
 from parameterize.spline.body import Body as Body
@@ -42,6 +44,7 @@ from .errors import InputError as InputError
 from .errors import TimeLimitError as TimeLimitError
 from .io.formats import export as export
 from .io.formats import load_volume as load_volume
+from .io.meshes import load_mesh as load_mesh
 from .io.solutions import load_solution as load_solution
 from .options import ElasticityOptions as ElasticityOptions
 from .options import FiniteOptions as FiniteOptions
