@@ -44,6 +44,8 @@ from .progress import shown_batch, shown_progress
 from .refusal import refusal
 
 if TYPE_CHECKING:
+    from parameterize.meshes.mesh import VolumeMesh
+
     from ..workflow.output_folder import Outcome
 
 app = App(
@@ -228,10 +230,13 @@ def check(
     force: bool = False,
     as_json: Json = False,
 ) -> int:
-    """Check a surface for acceptance, or certify a volume; write nothing but a picture of regions.
+    """Check a surface for acceptance, or certify a volume or a volume mesh; write nothing but a picture of regions.
+
+    Of a volume mesh det J > 0 is proved or refuted on every element, and whether elements overlap.
 
     Args:
-        path: surface, name of a sample or a model, or a volume (.npz, or a file of G+Smo, MFEM, GeoPDEs or splinepy).
+        path: surface, name of a sample or a model, a volume (.npz, or a file of G+Smo, MFEM, GeoPDEs or splinepy), or
+            a mesh of hexahedra or tetrahedra, linear or curved (.msh, .inp, .vtu, .vtk, Exodus, CGNS).
         strict: refuse a surface that intersects itself; by default this is a notice.
         region: regions of the surface, such as "nz > 0.9 and x < 2"; the answer has the area of each region and the
             number of triangles that lie mostly in it; a region without a point of the surface is refused.
@@ -245,6 +250,11 @@ def check(
             options = "--component, --close, --deflection, --max-faces, --decimate, --sharp, --strict, --region"
             raise InputError(f"{path}: is a volume; {options} and --picture are for surfaces")
         return _check_volume(Path(path), as_json)
+    if surface == SurfaceOptions() and not (strict or region or picture):
+        from ..io.meshes import mesh_in
+
+        if (mesh := mesh_in(path)) is not None:
+            return _check_mesh(mesh, as_json)
     from ..models import resolve
     from .facts import surface_in_words
 
@@ -273,6 +283,20 @@ def _check_volume(path: Path, as_json: bool) -> int:
     facts = facts_of_file(path, load_volume(path))
     _print(reports.as_json(facts) if as_json else answer.volume_in_words(facts))
     return answer.exit_code({"parameterization": facts})
+
+
+def _check_mesh(mesh: VolumeMesh, as_json: bool) -> int:
+    """Certify a volume mesh, print the verdict and return the exit code."""
+    from parameterize.compilation import compilation_told
+    from parameterize.meshes.certify import certify_mesh
+
+    from ..report import document as reports
+    from .facts import mesh_in_words
+
+    with compilation_told():
+        found = certify_mesh(mesh)
+    _print(reports.as_json(found.as_dict()) if as_json else mesh_in_words(found))
+    return DONE if found.is_proved else NOT_CERTIFIED
 
 
 @app.command(name="sample")

@@ -19,9 +19,13 @@ ENDINGS = (".msh", ".vtu", ".vtk", *ALWAYS)
 MAX_BYTES = 4 << 30
 
 
-def is_mesh_file(path: str | Path) -> bool:
-    """Return whether a file's ending is one of a volume mesh."""
-    return Path(path).suffix.lower() in ENDINGS
+def mesh_in(path: str | Path) -> VolumeMesh | None:
+    """Return the mesh of a file that may also be a surface; None where it is one, or missing. Raises InputError."""
+    source = Path(path)
+    ending = source.suffix.lower()
+    if ending in ALWAYS:
+        return load_mesh(source)
+    return find_mesh(source) if ending in ENDINGS and source.is_file() else None
 
 
 def load_mesh(path: str | Path) -> VolumeMesh:
@@ -57,7 +61,7 @@ def load_mesh(path: str | Path) -> VolumeMesh:
     """
     check_type("path", path, str | Path)
     source = Path(path)
-    if not is_mesh_file(source):
+    if source.suffix.lower() not in ENDINGS:
         raise InputError(f"{path}: is no volume mesh: expected a name ending in one of {' '.join(ENDINGS)}")
     found = find_mesh(source)
     if found is None:

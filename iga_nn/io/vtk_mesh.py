@@ -27,6 +27,8 @@ OTHERS |= {74: "Lagrange pyramid", 80: "Bezier wedge", 81: "Bezier pyramid"}
 
 def read_vtk_mesh(path: Path) -> VolumeMesh | None:
     """Return the solid cells of a file, numbered from 0, None where there are none. Raises ValueError for a bad one."""
+    if path.suffix.lower() == ".vtk" and not _is_unstructured(path):
+        return None
     grids = list(_grids(path))
     if not any(len(types) for _, types, *_ in grids):
         return None
@@ -51,6 +53,13 @@ def read_vtk_mesh(path: Path) -> VolumeMesh | None:
         Block(kind, *(np.concatenate(arrays) for arrays in zip(*rows, strict=True))) for kind, rows in found.items()
     )
     return VolumeMesh(np.concatenate(points), tuple(blocks), unchecked)
+
+
+def _is_unstructured(path: Path) -> bool:
+    """Return whether a legacy file begins as one with cells of several kinds, or as none at all."""
+    with path.open("rb") as stream:
+        head = stream.read(1024).upper()
+    return b"UNSTRUCTURED_GRID" in head or b"DATASET" not in head
 
 
 def _rational(weights: Array) -> Any:
