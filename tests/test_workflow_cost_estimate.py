@@ -18,7 +18,8 @@ from thick_bodies import star
 import iga_nn
 from iga_nn.cli.commands import main
 from iga_nn.report import document as report
-from iga_nn.workflow.cost_estimate import Forecast, available_memory_mb, forecast
+from iga_nn.workflow import pace
+from iga_nn.workflow.cost_estimate import Forecast, available_memory_mb, before_layout, forecast
 from parameterize.config import preset
 from parameterize.layouts.planes import exact_blocks as planes
 from parameterize.layouts.planes.prisms import prisms
@@ -42,7 +43,7 @@ def test_more_work_takes_longer_and_more_memory():
     bean, fast, clock = iga_nn.sample("bean"), preset("fast"), time.process_time
     quick = forecast(bean, fast.scaled(0.05).with_control_points(8), device=CPU, clock=clock)
     usual = forecast(bean, fast, device=CPU, clock=clock)
-    solved = forecast(bean, fast, device=CPU, clock=clock, unknowns=2_000_000)
+    solved = forecast(bean, fast, device=CPU, clock=clock, unknowns=2_000_000, levels=(0, 1, 2))
     paper = forecast(bean, replace(preset("paper"), train=preset("fast").train), device=CPU, clock=clock)
     assert quick.seconds[1] < usual.seconds[0] < usual.seconds[1] < paper.seconds[1]
     assert quick.memory_mb < usual.memory_mb < solved.memory_mb
@@ -61,21 +62,40 @@ def test_given_corners_on_a_box_are_trained(monkeypatch):
 
 FAST = preset("fast")
 STAR = star(np.vstack([np.eye(3), -np.eye(3)]))[:2]
-WITHOUT_A_TIME = {
+OF_BLOCKS = {
     "a ring": (trimesh.creation.torus(2.0, 0.6), FAST, "blocks"),
     "a drum": (trimesh.creation.cylinder(1.0, 1.0, sections=40), FAST.with_blocks(1), "sharp edges"),
-    "a ball": (trimesh.creation.icosphere(3), FAST.with_blocks(3), "blocks"),
 }
 
 
-@pytest.mark.parametrize("name", WITHOUT_A_TIME)
-def test_no_time_is_told_for_a_way_whose_work_is_not_known(name, monkeypatch):
-    """The counts are those of a cube that is trained: 36 s were told for a part of blocks that took 711 s."""
+@pytest.mark.parametrize("name", OF_BLOCKS)
+def test_the_time_of_a_way_that_trains_no_network_needs_none(name, monkeypatch):
+    """The counts were those of a cube that is trained: 36 s were told for a part of blocks that took 711 s."""
     monkeypatch.setattr("iga_nn.workflow.cost_estimate._pass_seconds", lambda *_: pytest.fail("measured for nothing"))
-    mesh, config, way = WITHOUT_A_TIME[name]
-    said = forecast(surface_from_arrays(np.array(mesh.vertices), np.array(mesh.faces), name), config, device=CPU)
-    assert (said.seconds, said.way) == (None, way) and said.memory_mb > 500.0
-    assert re.fullmatch(rf"no forecast of the time for the way: {way}, \d\.\d GB of memory", str(said))
+    mesh, config, way = OF_BLOCKS[name]
+    surface = surface_from_arrays(np.array(mesh.vertices), np.array(mesh.faces), name)
+    said = forecast(surface, config, device=CPU, clock=time.process_time)
+    assert said.way == way and 10.0 < said.seconds[0] < said.seconds[1] < 300.0 and said.memory_mb > 500.0
+
+
+def test_a_way_without_blocks_for_the_body_has_no_time():
+    mesh = trimesh.creation.icosphere(3)
+    ball = surface_from_arrays(np.array(mesh.vertices), np.array(mesh.faces), "ball")
+    assert forecast(ball, FAST.with_blocks(3), device=CPU).seconds is None
+    assert re.fullmatch(r"no forecast of the time for this body, \d\.\d GB of memory", str(Forecast(None, 900.0)))
+
+
+def test_before_the_layout_parts_and_handles_have_the_times_of_their_kind():
+    ring = trimesh.creation.torus(2.0, 0.6)
+    smooth = surface_from_arrays(np.array(ring.vertices), np.array(ring.faces), "ring")
+    assert before_layout(iga_nn.sample("cube"), 1.0) is None and before_layout(smooth, 2.0) == (40.0, 220.0)
+
+
+def test_the_unknowns_of_a_level_are_those_of_its_space():
+    assert pace.unknowns_of(27000, 1, 3, 1) == pytest.approx(57**3)
+    hexahedra = 1000 * 3**3  # each shares its faces with others
+    assert pace.unknowns_of(hexahedra, 1000, 3, 1) == pytest.approx(1000 * 4**3)
+    assert pace.solve_seconds((0, 1), 27000, 1, 3, 3) < pace.solve_seconds((0, 1), 27000, 900, 3, 3)
 
 
 def test_blocks_of_extrusions_have_their_own_time():

@@ -1,7 +1,7 @@
 """Estimates the time and the memory of a run, and the memory of a solve, before it starts.
 
-The way that a map will take counts its work in two pieces, see parameterize/ways/cost.py: passes and products. Their
-time is measured on all threads. The cost of a solve follows from counts alone.
+The way that a map will take counts its work in pieces, see parameterize/ways/cost.py: passes and products, whose time
+is measured on all threads, and seconds by the pace of this machine. The cost of a solve follows from counts alone.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ import logging
 import math
 import platform
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -21,6 +21,7 @@ from parameterize.config import Config, SplineConfig
 from parameterize.spline.body import BodyLike, as_body
 from parameterize.spline.volume import BSplineVolume
 from parameterize.surface.surface import Surface
+from parameterize.ways.sharp import has_long_edges
 from solve.discretization.error_norms import POINTS
 from solve.discretization.roughness import rule_of
 from solve.discretization.space import Places, trial_space
@@ -29,19 +30,15 @@ from solve.options import SolveOptions
 
 from ..figures.fields import problems_on
 from ..rounding import rounded
+from .pace import PARTS, SHARP, SMOOTH, Clock, end_seconds, fastest, pace, solve_seconds
 
 log = logging.getLogger(__name__)
 
-Clock = Callable[[], float]
-REPEATS = 3
 PASS_POINTS = 4096  # that a pass is timed with, on all threads
 LARGEST = 30  # control points per direction that the product is timed with; beyond, it grows with their number
 
-# Passes
-LAST_VERTEX = 0.04  # for each vertex of the surface: all that comes after the map
-CALLS = 0.12  # least cost of a product
-UNKNOWN = 2.4e-3  # for each unknown of the problem solved
-REST = 1000.0  # libraries loaded, figures drawn
+CALLS = 0.12  # passes: least cost of a product
+PASS = 0.0103  # seconds of a pass at pace 1, where no network is trained and torch is not loaded
 
 # Megabytes
 LIBRARIES, FIGURES, PER_CONTROL_POINT, PER_VERTEX, PER_UNKNOWN = 560.0, 400.0, 8e-3, 16e-3, 1.6e-3
@@ -57,23 +54,44 @@ EVERYWHERE = 3  # an unknown: the solution, whole on every process
 class Forecast:
     """Hold the cost of one start, the section `estimate` of report.json.
 
-    seconds: the seconds for an easy and for a hard surface, None if the work of the way is not known. memory_mb: the
-    peak of the resident memory. way: the name of the way, "" if none suits.
+    seconds: from here to the end of the run, for an easy and for a hard surface, None if the work of the way is not
+    known. memory_mb: the peak of the resident memory. way: the name of the way, "" if none suits. pace: the seconds
+    that now pass in one of those that stages were measured in. before: the same seconds from before the layout,
+    which is known by now; None where none is laid.
     """
 
     seconds: tuple[float, float] | None
     memory_mb: float
     way: str = ""
+    pace: float = 1.0
+    before: tuple[float, float] | None = None
 
     def __str__(self) -> str:
         if self.seconds is None:
             way = f"the way: {self.way}" if self.way else "this body"
             return f"no forecast of the time for {way}, {rounded(self.memory_mb / 1000.0, 1)} GB of memory"
-        low, high = self.seconds
-        unit, size = ("minute", 60.0) if high >= 90.0 else ("second", 1.0)
-        first, last = max(1, round(low / size)), max(1, round(high / size))
-        span = f"{first} to {last} {unit}s" if first < last else f"{last} {unit}{'s' * (last > 1)}"
-        return f"about {span}, {rounded(self.memory_mb / 1000.0, 1)} GB of memory"
+        return f"about {span_in_words(*self.seconds)}, {rounded(self.memory_mb / 1000.0, 1)} GB of memory"
+
+
+def span_in_words(low: float, high: float) -> str:
+    """Return two numbers of seconds in words, such as "12 to 89 seconds" or "2 minutes"."""
+    unit, size = ("minute", 60.0) if high >= 90.0 else ("second", 1.0)
+    first, last = max(1, round(low / size)), max(1, round(high / size))
+    return f"{first} to {last} {unit}s" if first < last else f"{last} {unit}{'s' * (last > 1)}"
+
+
+def before_layout(surface: Surface, now: float) -> tuple[float, float] | None:
+    """Return the seconds of a run before the blocks of its body are known; None for one cube, whose work is counted.
+
+    now: the pace of the machine.
+    """
+    if surface.brep or not surface.is_plain:
+        kind = PARTS
+    elif surface.genus:
+        kind = SHARP if has_long_edges(surface) else SMOOTH
+    else:
+        return None
+    return now * kind[0], now * kind[1]
 
 
 def forecast(
@@ -82,18 +100,21 @@ def forecast(
     *,
     device: str,
     unknowns: int = 0,
+    levels: Sequence[int] = (),
+    components: int = 1,
     corners: Sequence[int] | None = None,
     checkpoints: Checkpoints | None = None,
     clock: Clock = time.perf_counter,
 ) -> Forecast:
     """Return the estimate for this machine under its present load, by the first way that the map will take.
 
-    unknowns: the number of unknowns of the largest problem that is solved afterwards. corners: the vertices (8,) that
+    unknowns: the number of unknowns of the largest problem that is solved afterwards, for its memory. levels,
+    components: of this problem, for its time. corners: the vertices (8,) that
     the user gives. checkpoints: of a run that resumes, whose way is known. A second way, if the first map is not
     certified, takes the same time again.
     """
-    from parameterize.training.backend import one_thread_an_operation
     from parameterize.ways.mapping_task import MappingTask
+    from parameterize.ways.network import NETWORK
     from parameterize.ways.strategy import WAYS, cost_of_first, ways_of
 
     vertices, given = len(surface.vertices), None if corners is None else np.array(corners)
@@ -105,19 +126,31 @@ def forecast(
     memory = LIBRARIES + FIGURES + max(cost.memory_mb if cost else 0.0, mapped, PER_UNKNOWN * unknowns)
     if cost is None:
         return Forecast(None, memory, way)
-    with one_thread_an_operation():  # as the run does: a helping thread keeps its first settings
-        one_pass = _pass_seconds(config, device, clock)
+    now, degree = pace(clock), config.spline.degree
+    low, high = (now * seconds for seconds in cost.seconds)
+    if any(cost.passes) or any(cost.products):
+        one_pass = _trained_pass_seconds(config, device, clock) if way == NETWORK.name else PASS * now
         product = _product_seconds(config.spline, clock) + CALLS * one_pass
-    last = (REST + LAST_VERTEX * vertices + UNKNOWN * unknowns) * one_pass
-    pairs = zip(cost.passes, cost.products, strict=True)
-    low, high = sorted(passes * one_pass + products * product + last for passes, products in pairs)
-    return Forecast((low, high), memory, way)
+        pairs = zip(cost.passes, cost.products, strict=True)
+        more = [passes * one_pass + products * product for passes, products in pairs]
+        low, high = low + min(more), high + max(more)
+    last = end_seconds(vertices, cost.patches, bool(levels))
+    last += solve_seconds(levels, cost.control_points, cost.patches, degree, components)
+    return Forecast((low + now * last, high + now * last), memory, way, now)
+
+
+def _trained_pass_seconds(config: Config, device: str, clock: Clock) -> float:
+    """Return the seconds of a pass in the present settings of a training."""
+    from parameterize.training.backend import one_thread_an_operation
+
+    with one_thread_an_operation():  # as the run does: a helping thread keeps its first settings
+        return _pass_seconds(config, device, clock)
 
 
 def _pass_seconds(config: Config, device: str, clock: Clock) -> float:
     from parameterize.training.network import a_pass
 
-    return _fastest(a_pass(config.network, device, PASS_POINTS), clock) * 1000.0 / PASS_POINTS
+    return fastest(a_pass(config.network, device, PASS_POINTS), clock) * 1000.0 / PASS_POINTS
 
 
 def _product_seconds(spline: SplineConfig, clock: Clock) -> float:
@@ -130,18 +163,8 @@ def _product_seconds(spline: SplineConfig, clock: Clock) -> float:
     control = np.stack(np.meshgrid(rows, rows, rows, indexing="ij"))
     product = BlockDistortion((knots, knots, knots), spline.degree).curvature(control)
     single = control.astype(np.float32)
-    seconds = _fastest(lambda: float(product(single).sum()), clock)
+    seconds = fastest(lambda: float(product(single).sum()), clock)
     return seconds * (spline.control_points / count) ** 3
-
-
-def _fastest(work: Callable[[], object], clock: Clock) -> float:
-    """Return the seconds of the fastest run; the first run only warms up and does not count."""
-    seconds = []
-    for _ in range(REPEATS + 1):
-        start = clock()
-        work()
-        seconds.append(clock() - start)
-    return max(min(seconds[1:]), 1e-6)
 
 
 def available_memory_mb(processes: int = 1) -> float | None:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import json
 import logging
-from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -37,8 +37,9 @@ from ..report import document as reports
 from ..report.advice import unproved_places, with_unproved
 from ..report.artifacts import SOLVED
 from ..rounding import rounded
-from .cost_estimate import Forecast, forecast, warn_of_memory
+from .cost_estimate import Forecast, before_layout, forecast, span_in_words, warn_of_memory
 from .output_folder import CHECKPOINT, RunFolder, changed_file, has_checkpoint
+from .pace import pace
 from .regions import check_regions, frame_of
 from .time_limit import checked, for_later, stopped_in_words
 from .verdict import tell
@@ -105,11 +106,12 @@ def map_surface(
     known: dict[str, Any],
     problem: BoundaryValueProblem | None = None,
     unknowns: int = 0,
+    levels: Sequence[int] = (),
 ) -> Parameterization:
     """Parameterize a surface, write all results on the map into the folder, and return it.
 
-    known: the command that repeats the run and the identity of the run, for the report. problem, unknowns: the problem
-    that is solved on the map, and its number of unknowns.
+    known: the command that repeats the run and the identity of the run, for the report. problem, unknowns, levels: the
+    problem that is solved on the map, its number of unknowns, and the levels that it is solved on.
     """
 
     def made(body: BodyLike, history: dict[str, Any]) -> None:
@@ -118,7 +120,7 @@ def map_surface(
         _draw(state, given, body, history)
 
     with compilation_told():
-        expected = _prepare(state, given, mapping, problem, unknowns)
+        expected = _prepare(state, given, mapping, problem, unknowns, levels)
         with for_later(is_solved=problem is not None):
             result = _train(given, mapping, checked(progress), made, state.folder / CHECKPOINT)
     with closing():
@@ -167,7 +169,12 @@ def _is_of_map(report: reports.Report, given: MapInput) -> bool:
 
 
 def _prepare(
-    state: RunFolder, given: MapInput, mapping: MapOptions, problem: BoundaryValueProblem | None, unknowns: int
+    state: RunFolder,
+    given: MapInput,
+    mapping: MapOptions,
+    problem: BoundaryValueProblem | None,
+    unknowns: int,
+    levels: Sequence[int],
 ) -> Forecast:
     """Check the problem's data on the surface, announce the cost of the run, and return it.
 
@@ -188,14 +195,21 @@ def _prepare(
     if mapping.resume and not is_resumed:
         log.info("no checkpoint, starting anew")
     with state.timed("load"):
+        before = None if is_resumed else before_layout(surface, pace())
+        if before is not None:
+            said = "the layout of its blocks comes first, and an interruption before it ends loses it"
+            log.info("estimate before the layout: about %s; %s", span_in_words(*before), said)
         expected = forecast(
             surface.fitted[0],
             mapping.config(),
             device=given.identity["device"],
             unknowns=unknowns,
+            levels=levels,
+            components=1 if problem is None else problem.form.components,
             corners=given.identity["corners"],
             checkpoints=checkpoints,
         )
+        expected = replace(expected, before=before)
     log.info("estimate: %s", expected)
     needed = f"{rounded(expected.memory_mb / 1000.0, 1)} GB of memory are needed"
     warn_of_memory(expected.memory_mb, needed, "lower --control-points or --refine, or free some")

@@ -192,7 +192,8 @@ def parameterize_to(
             if options is not None:
                 with input_errors():
                     check_asks(options.ask, given.surface)
-            body = map_surface(state, given, mapping, progress, known, problem, unknowns).volume
+            levels = () if problem_options is None else problem_options.levels
+            body = map_surface(state, given, mapping, progress, known, problem, unknowns, levels).volume
         if problem_options is None or problem is None or options is None:
             return _finish(state, body)
         if stays_unsolved(state, problem_options.solve_anyway):

@@ -24,8 +24,10 @@ from ..options import NO_UNITS, ProblemOptions, Units, check_size
 from ..report import document as reports
 from ..report import html
 from ..report.extremes import peak_notices
+from .cost_estimate import span_in_words
 from .levels import KeptLevels, Levels
 from .output_folder import RunFolder
+from .pace import level_seconds, pace
 from .refining import each_step, stopped_notice
 from .time_limit import demand_time, for_page
 
@@ -171,7 +173,11 @@ def each_level(
     began, unknowns, processes = 0.0, 0, 1 if options.comm is None else options.comm.size
     for level in sorted(levels):
         count = check_size(body, level, options.degree, problem.form.components, processes)
-        demand_time(level, (time.monotonic() - began) * count / unknowns if unknowns else 0.0)
+        taken = (time.monotonic() - began) * count / unknowns if unknowns else 0.0
+        demand_time(level, taken)
+        if type(problem_options).solved is ProblemOptions.solved:  # others keep their load steps
+            first = level_seconds(count, problem.form.components, len(as_body(body)))
+            _tell_level(level, count, taken or pace() * first)
         began, unknowns = time.monotonic(), count
         steps = Checkpoints.none() if checkpoints is None else checkpoints.of_part(f"level{level}")
         try:
@@ -188,6 +194,12 @@ def each_level(
         yield solution
         if problem.form.components == 1:
             options = replace(options, start=solution)
+
+
+def _tell_level(level: int, unknowns: int, seconds: float) -> None:
+    """Log what a level takes, and what an interruption of it loses."""
+    about = span_in_words(seconds, seconds)
+    log.info("refine %d: %s unknowns, about %s; an interruption loses this level alone", level, f"{unknowns:,}", about)
 
 
 @contextmanager

@@ -26,10 +26,12 @@ from ..progress import timed
 from ..spline.spline_map import SplineMap
 from ..surface.geometry import normals_and_areas
 from ..threads import one_blas_thread
+from .cost import Cost
 from .growth import GROWTH, STEPS, Grow
 from .laid import in_words, kept_blocks
 from .mapping_task import MOST_POINTS, MappingTask
 from .one_cube import MORE_ROUNDS
+from .sharp import has_long_edges
 from .way import Attempt, Suits, Way, optimized
 
 _log = logging.getLogger(__name__)
@@ -98,6 +100,11 @@ class AlongSkeleton(Way):
         stiff = optimized(first, fit, schedule(task.config), task, checkpoints, STIFF_WEIGHTS)
         return softened(stiff, task, checkpoints)
 
+    def cost(self, task: MappingTask) -> Cost:
+        """Return the cost of the rounds of the blocks, which the checkpoint keeps."""
+        first = kept_blocks(task.checkpoints, lambda: spline_of(_blocks(task), task.config.spline.degree))
+        return Cost.of_blocks(first.control.shape[1], len(first.nets.knots), has_long_edges(task.surface))
+
     def serves(self, attempt: Attempt) -> bool:
         """Return whether the map has no faults, and is close to the surface: one cube may be closer.
 
@@ -142,7 +149,11 @@ def _compactness(task: MappingTask) -> float:
 def _blocks(task: MappingTask) -> Complex:
     """Return thin blocks along the skeleton. Raises SkeletonError and LayoutError if there are none."""
     surface, most = task.surface, task.config.blocks
-    blocks = blocks_along(task.skeleton, surface.unit_vertices, surface.faces, task.spans_across, task.in_users_units)
+
+    def find() -> Complex:
+        return blocks_along(task.skeleton, surface.unit_vertices, surface.faces, task.spans_across, task.in_users_units)
+
+    blocks = task.fact(("blocks", task.spans_across), find)
     if most is not None and len(blocks) > most:
         raise LayoutError(f"the skeleton needs {len(blocks)} blocks, and at most {most} are allowed: allow more")
     return blocks

@@ -18,7 +18,7 @@ from ..surface.surface import Surface
 from ..threads import one_blas_thread
 from .laid import Laid
 from .mapping_task import MappingTask
-from .sharp import FEW_EDGES, PIECE
+from .sharp import has_long_edges
 from .tried import Tried
 from .way import Attempt, Suits, Way
 
@@ -78,12 +78,6 @@ def is_part(surface: Surface) -> bool:
     if surface.brep or not surface.is_plain:
         return True
     return surface.genus > 0 and has_long_edges(surface)
-
-
-def has_long_edges(surface: Surface) -> bool:
-    """Return whether a body has sharp edges that are long in all."""
-    lengths = surface.scale * surface.features.lengths
-    return float(lengths[lengths > PIECE].sum()) >= FEW_EDGES
 
 
 def _apart(found: CurvedMesh, degree: int, names: tuple[str, ...]) -> SplineMap:

@@ -41,11 +41,15 @@ class Laid(Way):
     def make(self, task: MappingTask, checkpoints: Checkpoints) -> Attempt:
         """Return the attempt whose map is left as it is laid, which a checkpoint keeps."""
         with timed(task.seconds, "fit"), one_blas_thread():
-            first = kept_blocks(checkpoints, lambda: self.lay(task))
+            first = kept_blocks(checkpoints, lambda: self._laid(task))
             fit = _correspondence(task, first)
         with timed(task.seconds, "optimize"), one_blas_thread():
             laid = CertifiedMap.of(first)
         return Attempt(laid, Course(Counter(), {}, self.why), fit, Weights())
+
+    def _laid(self, task: MappingTask) -> SplineMap:
+        """Return the map that `lay` makes, once for a run: the forecast asks first."""
+        return task.fact((self.name, task.config.spline), lambda: self.lay(task))
 
     def serves(self, attempt: Attempt) -> bool:
         """Return True: no other way makes a better map than proved blocks."""
@@ -53,8 +57,8 @@ class Laid(Way):
 
     def cost(self, task: MappingTask) -> Cost:
         """Return the cost of the certificate of the blocks, which the checkpoint keeps."""
-        first = kept_blocks(task.checkpoints, lambda: self.lay(task))
-        return Cost.of_certificate(first.control.shape[1], task.config)
+        first = kept_blocks(task.checkpoints, lambda: self._laid(task))
+        return Cost.of_certificate(first.control.shape[1], len(first.nets.knots))
 
 
 def in_words(count: int, noun: str) -> str:

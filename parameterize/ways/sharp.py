@@ -19,7 +19,9 @@ from ..optimization.phases import Polish, Schedule, Separate, Shape, Unfold
 from ..progress import timed
 from ..surface.features import features_of
 from ..surface.ridges import Ridges
+from ..surface.surface import Surface
 from ..threads import one_blas_thread
+from .cost import Cost
 from .mapping_task import MappingTask
 from .one_cube import COARSE, MORE_ROUNDS, OneCube, correspondence, first_spline, surface_on_cube
 from .tried import Tried
@@ -63,6 +65,10 @@ class Sharp(OneCube):
             first = first_spline(*extended(layout, _CELL), fit)
         return optimized(first, fit, schedule(task.config.spline), task, checkpoints)
 
+    def cost(self, task: MappingTask) -> Cost:
+        """Return the cost of the rounds."""
+        return Cost.of_cube(task.config, task.own)
+
     def serves(self, attempt: Attempt) -> bool:
         """Return whether the map has no faults, and it is also proved that the boundary does not meet itself."""
         return super().serves(attempt) and attempt.found.injective is not None
@@ -74,6 +80,12 @@ def schedule(spline: SplineConfig) -> Schedule:
 
 
 SHARP = Sharp("sharp edges", "laying the cube's edges along sharp edges")
+
+
+def has_long_edges(surface: Surface) -> bool:
+    """Return whether a body has sharp edges that are long in all."""
+    lengths = surface.scale * surface.features.lengths
+    return float(lengths[lengths > PIECE].sum()) >= FEW_EDGES
 
 
 def ridges_of(task: MappingTask) -> Ridges | None:

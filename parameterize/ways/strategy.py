@@ -88,13 +88,19 @@ def first_way(task: MappingTask, ways: tuple[Way, ...]) -> tuple[Way, Suits]:
 
 
 def cost_of_first(task: MappingTask, ways: tuple[Way, ...]) -> tuple[str, Cost | None]:
-    """Return the name and the cost of the first way that suits a body; "" and None if the run will refuse it."""
-    try:
-        with one_blas_thread():
+    """Return the name and the cost of the first way that suits a body; "" and None if the run will refuse it.
+
+    The cost is None, too, if the way turns out to have no blocks for the body.
+    """
+    with one_blas_thread():
+        try:
             way, _ = first_way(task, ways)
+        except (LayoutError, SkeletonError, CheckpointError):
+            return "", None
+        try:
             return way.name, way.cost(task)
-    except (LayoutError, SkeletonError, CheckpointError):
-        return "", None
+        except (LayoutError, SkeletonError):
+            return way.name, None
 
 
 def attempts(task: MappingTask, ways: tuple[Way, ...], checkpoints: Checkpoints) -> tuple[tuple[Tried, ...], str]:

@@ -29,6 +29,7 @@ from ..surface.solid import Solid
 from ..surface.surface import surface_from_arrays
 from ..threads import one_blas_thread
 from .blocks import BLOCKS, STIFF_WEIGHTS, TUBE_OF_HANDLES, schedule, softened, surface_fit
+from .cost import Cost
 from .growth import GROWTH
 from .laid import in_words
 from .mapping_task import MOST_POINTS, MappingTask
@@ -81,6 +82,11 @@ class WithStubs(Way):
         rounds = schedule(task.config, _FACE_SHARES, _POINT_SHARES)
         made = softened(optimized(first, fit, rounds, task, checkpoints, STIFF_WEIGHTS), task, checkpoints)
         return replace(made, course=made.course.after(earlier))
+
+    def cost(self, task: MappingTask) -> Cost:
+        """Return the cost of the rounds of the body alone, and of those with its rods."""
+        points, blocks = _CONTROL_POINTS**3 / 2.0, 20 * max(task.surface.genus, 1)
+        return Cost.of_blocks(points, blocks, is_sharp=True)
 
 
 STUBS = WithStubs("body with stubs", "mapping the body without its handles, and laying rods for these,")
