@@ -1,8 +1,8 @@
 """parameterize: a closed surface to a trivariate B-spline volume, certified where its proof succeeds."""
 
 import hashlib
-from collections.abc import Callable, Iterable
-from dataclasses import asdict, dataclass, replace
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import asdict, dataclass, field, replace
 from numbers import Integral
 from pathlib import Path
 from typing import Any
@@ -70,6 +70,8 @@ class Parameterization(Brief):
         The ways that were tried, in their order, with rounds and seconds by phase and the faults of their maps.
     refinement : Refinement or None
         With config.refinement, how many control points each direction got, or all blocks together, and why no more.
+    refused : dict of str to str
+        By the names of ways that were asked and do not suit the body: why, such as what the mesher says.
     decomposition : str
         Why the body was to become one cube or several blocks, in words, with the figures that decide; "" if the
         options say it.
@@ -96,6 +98,7 @@ class Parameterization(Brief):
     attempts: tuple[AttemptReport, ...]
     refinement: Refinement | None = None
     decomposition: str = ""
+    refused: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def division(self) -> str:
@@ -228,6 +231,7 @@ def parameterize(
         attempts=tuple(one.report() for one in tried),
         refinement=refinement,
         decomposition=decomposition,
+        refused=task.refused,
     )
 
 

@@ -146,3 +146,31 @@ def shown_in_grey(picture):
 def test_the_page_of_a_certified_map_gives_no_advice():
     good = {"parameterization": formula_parameterization().quality.as_dict()}
     assert advice.in_words(good) == []
+
+
+SHEET = {"file": "sheet.step", "thickness": 0.96, "bbox": [[0, 0, 0], [60, 40, 25]], "unit": "mm"}
+ONE_CUBE = {"attempts": [{"origin": "network"}]}
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (MapOptions(ways=("network",)), "leave out --ways, or add hexahedra to it"),
+        (MapOptions(blocks=1), "leave out --blocks"),
+        (MapOptions(corners=Path("mine.json")), "leave out --corners"),
+    ],
+)
+def test_a_thin_part_is_told_of_hexahedra_and_of_nothing_else(options, said):
+    thin = failed(**ONE_CUBE) | {"input": SHEET}
+    assert advice.what_to_try(thin, options) == [f"a part of 0.96 mm in 60: hexahedra, which serve every part: {said}"]
+    smooth = failed(**ONE_CUBE) | {"input": {"file": "duck.obj", "sharp_edges": {"length": 0.0}}}
+    assert "hexahedra" not in "\n".join(advice.what_to_try(smooth, options))
+
+
+def test_what_the_mesher_says_and_a_time_limit_are_reasons():
+    refused = failed(**ONE_CUBE, refused={"hexahedra": "Netgen takes more than 120 s"}) | {"input": {}}
+    (said,) = advice.what_to_try(refused, MapOptions())
+    assert said.startswith("hexahedra could not be made (Netgen takes more than 120 s): repair the surface")
+    assert advice.what_to_try(failed() | {"cut_map": "the rounds"}, MapOptions()) == [
+        "more time: --resume goes on, with a longer --time-limit or none"
+    ]

@@ -1,5 +1,6 @@
 """Advises on a map that is not certified: the places without a proof, and the remedies."""
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,9 @@ from ..options import MapOptions
 from .document import Report, is_certified, not_the_part
 
 SHOWN = 5  # places
+THIN = 1 / 20  # of the box's longest side: one cube is squeezed there
+HEXAHEDRA = ("hexahedra", "last hexahedra")  # names of ways
+SOLID_MODELS = (".step", ".stp", ".iges", ".igs", ".brep")
 
 
 def span_parameters(volume: BSplineVolume, spans: IntArray) -> Array:
@@ -72,19 +76,24 @@ def unproved_places(body: Body, certificate: Certificate) -> Array:
 def what_to_try(report: Report, mapping: MapOptions | None = None) -> list[str]:
     """Return remedies for a map that is not certified or not the part, the most promising first; else an empty list.
 
-    mapping: the options of the map, where they are known.
+    Where the reason is known they are those for this reason. mapping: the options of the map, where they are known.
     """
-    quality, remedies = report["parameterization"], list[str]()
     if is_certified(report) and not not_the_part(report):
         return []
-    if "patches" in quality and mapping is None:  # several patches of a file
-        return []
-    if "patches" in quality and mapping is not None:
-        kind = "max-" if mapping.control_points == "auto" else ""
-        return [*_of_the_surface(report), *_more_control_points(mapping.most_control_points, kind)]
+    if "cut_map" in report:
+        return ["more time: --resume goes on, with a longer --time-limit or none"]
+    known = [*_of_the_surface(report), *_of_the_ways(report, mapping)]
+    return known or _in_general(report, mapping)
+
+
+def _in_general(report: Report, mapping: MapOptions | None) -> list[str]:
+    """Return remedies where no reason is known."""
+    quality, remedies = report["parameterization"], list[str]()
+    if "patches" in quality:  # several patches; those of a file have no options
+        kind = "max-" if mapping is not None and mapping.control_points == "auto" else ""
+        return [] if mapping is None else _more_control_points(mapping.most_control_points, kind)
     if mapping is not None and mapping.steps_factor < 1.0:
         remedies.append("the whole training: leave out --steps-factor")
-    remedies += _of_the_surface(report)
     is_limit = quality.get("refinement", {}).get("stopped") == "limit reached"
     remedies += _more_control_points(max(quality["control_points"]), "max-" * is_limit)
     if not is_certified(report):  # there are places
@@ -103,6 +112,38 @@ def _of_the_surface(report: Report) -> list[str]:
     if report["parameterization"].get("boundary_meeting") and report["parameterization"]["bijective"] == "certified":
         remedies.append("a surface whose parts are farther apart there, or more faces around that gap")
     return remedies
+
+
+def _of_the_ways(report: Report, mapping: MapOptions | None) -> list[str]:
+    """Return the remedy of hexahedra, which serve every part with sharp edges, where they were not tried."""
+    quality, given = report["parameterization"], report.get("input", {})
+    tried = {attempt["origin"] for attempt in quality.get("attempts", ())}
+    if mapping is None or "hexahedra" in tried or not tried:
+        return []
+    why = _in_proportion(given)
+    refused = quality.get("refused", {})
+    if reason := next((refused[name] for name in HEXAHEDRA if name in refused), ""):
+        return [f"{why}hexahedra could not be made ({reason}): repair the surface there, or give a STEP file"]
+    is_solid = Path(str(given.get("file", ""))).suffix.lower() in SOLID_MODELS
+    if not is_solid and given.get("sharp_edges", {}).get("length", 0.0) <= 0.0:
+        return []
+    if mapping.ways and not {name.replace("-", " ") for name in mapping.ways} & set(HEXAHEDRA):
+        return [f"{why}hexahedra, which serve every part: leave out --ways, or add hexahedra to it"]
+    if mapping.blocks != "auto":
+        return [f"{why}hexahedra, which serve every part: leave out --blocks"]
+    if mapping.corners is not None:
+        return [f"{why}hexahedra, which serve every part: leave out --corners"]
+    return []
+
+
+def _in_proportion(given: Report) -> str:
+    """Return in words how thin a part is, such as "a part of 1 mm in 60: "; "" for one that is not thin."""
+    if not (thickness := given.get("thickness")) or "bbox" not in given:
+        return ""
+    low, high = np.array(given["bbox"])
+    size = float((high - low).max())
+    unit = f" {given['unit']}" if given.get("unit") else ""
+    return f"a part of {thickness:.2g}{unit} in {size:.3g}: " if thickness < THIN * size else ""
 
 
 def _more_control_points(known: int, kind: str = "") -> list[str]:

@@ -20,7 +20,7 @@ from parameterize.progress import ProgressCallback
 from parameterize.spline.body import BodyLike, as_body
 from parameterize.spline.solids import PatchSolids
 from parameterize.spline.volume import FACE_NAMES
-from parameterize.surface.geometry import vertex_normals
+from parameterize.surface.geometry import normals_and_areas, vertex_normals
 from parameterize.surface.surface import Surface
 from parameterize.time_limit import closing
 from solve import ExpressionError
@@ -216,6 +216,11 @@ def _prepare(
     return expected
 
 
+def _thickness(surface: Surface) -> float:
+    """Return the mean thickness of a body: twice its volume over its area, which is that of a thin plate."""
+    return 2.0 * surface.volume / float(normals_and_areas(surface.vertices, surface.faces)[1].sum())
+
+
 def _notices(surface: Surface) -> list[str]:
     """Return the notices of a surface, and that on the copy it is fitted on."""
     return [*surface.notices, *filter(None, [surface.fitted[1]])]
@@ -368,7 +373,7 @@ def _write(
     result.boundary.save(state.folder / "boundary.npz")
     save_arrays(state.folder / "history.npz", **result.history)
     state.write(
-        input=given.surface.summary() | {"notices": _notices(given.surface)},
+        input=given.surface.summary() | {"notices": _notices(given.surface), "thickness": _thickness(given.surface)},
         config=asdict(result.config),
         estimate=asdict(expected),
         files={name: digest(state.folder / name) for name in _OF_MAP},
@@ -378,6 +383,7 @@ def _write(
         **({"cut_map": said} if (said := stopped_in_words()) else {}),
         parameterization=with_unproved(result.quality.as_dict(), as_body(result.volume), result.certificate)
         | {"origin": result.origin, "decomposition": result.decomposition, "division": result.decomposition}
+        | ({"refused": dict(result.refused)} if result.refused else {})
         | {"attempts": [asdict(attempt) for attempt in result.attempts]}
         | ({"refinement": asdict(result.refinement)} if result.refinement else {}),
     )

@@ -39,6 +39,7 @@ class MappingTask:
     seconds: dict[str, float]  # by step, of the run so far
     report: dict[str, Any]  # history and progress, as Trainer and optimize take them
     checkpoints: Checkpoints = field(default_factory=Checkpoints.none)  # of what all ways share
+    refused: dict[str, str] = field(default_factory=dict)  # why ways do not suit the body, by their names
 
     @property
     def own(self) -> int:

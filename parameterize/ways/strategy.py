@@ -80,11 +80,19 @@ def first_way(task: MappingTask, ways: tuple[Way, ...]) -> tuple[Way, Suits]:
         )
     words = Suits(False)
     for way in ways:
-        suits = way.suits(task)
+        suits = _suits(way, task)
         words = suits if suits.why else words
         if suits.applies:
             return way, words
     raise LayoutError(f"none of the ways asked for suits this body ({names_of(ways)}): allow others")
+
+
+def _suits(way: Way, task: MappingTask) -> Suits:
+    """Return whether a way suits a body; if not, its reason is kept for the report."""
+    suits = way.suits(task)
+    if not suits.applies and suits.why:
+        task.refused[way.name] = suits.why
+    return suits
 
 
 def cost_of_first(task: MappingTask, ways: tuple[Way, ...]) -> tuple[str, Cost | None]:
@@ -147,7 +155,7 @@ def _is_next(way: Way, tried: tuple[Tried, ...], task: MappingTask) -> bool:
     """Return whether a way is taken after those that were tried; of those that count there is a limit."""
     if way.counted and sum(one.way.counted for one in tried) >= task.most_starts:
         return False
-    return not tried or (way.follows(tried) and way.suits(task).applies)
+    return not tried or (way.follows(tried) and _suits(way, task).applies)
 
 
 def _tell(last: Tried, way: Way) -> None:
