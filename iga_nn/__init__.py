@@ -74,7 +74,7 @@ _HOME = {  # module, and the name there where it is another one; type checkers r
     "certify_mesh": "parameterize.meshes.certify",
     "convergence": "solve",
     "discretize": "solve",
-    "export": "iga_nn.io.formats",
+    "export": "iga_nn.io.export",
     "integrate": "solve",
     "load_solution": "iga_nn.io.solutions",
     "load_mesh": "iga_nn.io.meshes",

@@ -42,7 +42,7 @@ from solve.forms.plasticity import Plasticity as Plasticity
 from .batch.run_batch import run_batch as run_batch
 from .errors import InputError as InputError
 from .errors import TimeLimitError as TimeLimitError
-from .io.formats import export as export
+from .io.export import export as export
 from .io.formats import load_volume as load_volume
 from .io.meshes import load_mesh as load_mesh
 from .io.solutions import load_solution as load_solution

@@ -18,7 +18,8 @@ from volumes import spans_at
 from iga_nn.cli.commands import main
 from iga_nn.errors import InputError
 from iga_nn.io.beginnings import is_volume
-from iga_nn.io.formats import export, load_volume
+from iga_nn.io.export import export
+from iga_nn.io.formats import load_volume
 from parameterize.spline.bernstein import binomials, elevation
 from parameterize.spline.body import Body
 from parameterize.spline.bspline import open_uniform_knots
@@ -476,7 +477,7 @@ def test_without_splinepy_the_way_to_install_it_is_said(in_folder, monkeypatch, 
 @pytest.mark.parametrize(
     ("arguments", "says"),
     [
-        (["map.npz", "--to", "step"], "'step': choose one of gismo, mfem, vtk, view, json; IGES and STEP"),
+        (["map.npz", "--to", "stl"], "'stl': choose one of gismo, mfem, vtk, view, json, calculix"),
         (["missing.npz", "--to", "vtk"], "missing.npz: no such file"),
         (
             ["words.txt", "--to", "vtk"],

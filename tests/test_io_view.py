@@ -89,7 +89,7 @@ def test_a_solve_leaves_its_cells_and_export_knows_the_law(in_folder, capsys):
     for more, says in (
         (["--to", "view", "--quantity", "flow"], "Elasticity gives no 'flow'; it gives u, gradient"),
         (["--to", "view", "--samples", "0"], "samples 0: must be 1 or larger"),
-        (["--to", "vtk", "--samples", "1"], "format 'vtk': samples and quantities are for --to view"),
+        (["--to", "vtk", "--samples", "1"], "format 'vtk': --samples is for --to view, calculix"),
     ):
         assert main([*export, *more, "--force"]) == 2
         (line,) = capsys.readouterr().err.splitlines()

@@ -5,7 +5,8 @@ import logging
 import numpy as np
 import pytest
 
-from iga_nn.io.formats import export, load_volume
+from iga_nn.io.export import export
+from iga_nn.io.formats import load_volume
 from iga_nn.report.viewer import scene_of
 from iga_nn.workflow.verdict import certified_facts
 from parameterize.certificate.boundary import check_boundary

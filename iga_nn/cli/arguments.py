@@ -78,6 +78,9 @@ Volume = Annotated[
     Path,
     Parameter(help="volume.npz as `iga-nn run` writes it, or a file of G+Smo (XML), MFEM, GeoPDEs or splinepy (JSON)."),
 ]
+VolumeOrRun = Annotated[
+    Path, Parameter(help="volume.npz, another file with a volume, or the output folder of a run, with its solution.")
+]
 ObjFile = Annotated[Path | None, Parameter(help="file to write; NAME.obj in the current folder by default.")]
 Overwrite = Annotated[bool, Parameter(help="replace that file where it has other content.")]
 Mpi = Annotated[

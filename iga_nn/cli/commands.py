@@ -36,6 +36,7 @@ from .arguments import (
     Overwrite,
     PageOptions,
     Volume,
+    VolumeOrRun,
     converted,
     for_each_problem,
     with_values,
@@ -331,7 +332,7 @@ def fetch_model(name: str, /, *, out: ObjFile = None, force: Overwrite = False) 
 
 @app.command(name="export")
 def export_volume(
-    volume: Volume,
+    volume: VolumeOrRun,
     /,
     *,
     to: str,
@@ -339,13 +340,14 @@ def export_volume(
     solution: Path | None = None,
     samples: int | None = None,
     quantity: tuple[str, ...] = (),
+    element: str | None = None,
     force: bool = False,
 ) -> None:
-    """Write a volume in a format that other programs read.
+    """Write a volume, or the volume and the solution of a run, in a format that other programs read.
 
     Args:
         to: gismo (G+Smo XML), mfem (NURBS mesh), vtk (exact Bezier cells), view (samples for slicing in ParaView),
-            json (splinepy's).
+            json (splinepy's), calculix (Abaqus' and CalculiX' input file, with the problem of the run).
         out: file to write; the volume's stem with the format's ending in the current folder by default.
         solution: solution.npz to export, too: as point data u (vtk, view), or in a file beside it (NAME_u.xml, NAME.gf,
             NAME_u.json).
@@ -353,11 +355,13 @@ def export_volume(
             would have more than a million cells.
         quantity: quantities in a view of a solution, beside u, such as stress, von_mises, principal, strain, gradient,
             flux.
+        element: of calculix C3D20 (default), C3D20R or C3D8.
         force: replace an existing file.
     """
-    from ..io.formats import export
+    from ..io.export import export
 
-    _print(str(export(volume, to, out, solution=solution, samples=samples, quantity=quantity, force=force)))
+    how: dict[str, Any] = {"samples": samples, "quantity": quantity, "element": element, "force": force}
+    _print(str(export(volume, to, out, solution=solution, **how)))
 
 
 @app.command(name="compare")

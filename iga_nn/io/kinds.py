@@ -5,40 +5,87 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from parameterize.spline.body import Body
+from parameterize.spline.body import Body, BodyLike
 from parameterize.spline.interface import Face
 from parameterize.spline.volume import BSplineVolume
+from parameterize.surface.part import PartSurface
+from solve.field import FieldOnBody
+from solve.forms.boundary_value_problem import BoundaryValueProblem
 
-from . import geopdes, gismo, mfem, mfem_writer, splinepy, view, vtk
+from . import calculix, geopdes, gismo, mfem, mfem_writer, splinepy, view, vtk
 from .patches_of_files import body_of
 from .words import faults_of, text_of
 
 Content = tuple[Sequence[BSplineVolume], Iterable[tuple[Face, Face]]]  # patches, and faces that are declared glued
 
 
+@dataclass(frozen=True, eq=False)
+class Exported:
+    """Hold what is written: a body, its solution and problem, the surface of its part, None where there are none.
+
+    samples, quantities and element: as in `io.export.export`.
+    """
+
+    body: BodyLike
+    solution: FieldOnBody | None = None
+    problem: BoundaryValueProblem | None = None
+    part: PartSurface | None = None
+    samples: int | None = None
+    quantities: tuple[str, ...] | None = None
+    element: str | None = None
+
+
 @dataclass(frozen=True)
 class Format:
     """Hold a format of another program: a row of the table of volumes.
 
-    ending: of its files, after the volume's stem where they are written. write: puts the volume into a file; it is also
-    given the solution and its problem, None where there are none, and the samples and quantities of a view. beside:
-    ending and writer of a second file, where the solution needs one; it is given the volume, too. read: makes patches
-    of a text, which begins as a row of `io.beginnings` says.
+    ending: of its files, after the volume's stem where they are written. write: puts the volume and what belongs to it
+    into a file. beside: ending and writer of a second file, where the solution needs one; it is given the volume, too.
+    read: makes patches of a text, which begins as a row of `io.beginnings` says. takes: options of `export` that it
+    has. holds_solution: whether a solution or its problem has a place.
     """
 
     ending: str
-    write: Callable[..., None] | None = None
+    write: Callable[[Path, Exported], None] | None = None
     beside: tuple[str, Callable[[Path, Any, Any], None]] | None = None
     read: Callable[[str], Content] | None = None
+    takes: tuple[str, ...] = ()
+    holds_solution: bool = True
+
+
+def _view(path: Path, given: Exported) -> None:
+    view.write_view(path, given.body, given.solution, given.problem, given.samples, given.quantities)
+
+
+def _calculix(path: Path, given: Exported) -> None:
+    calculix.write_calculix(
+        path, given.body, given.problem, given.part, parts=given.samples or 1, element=given.element or "C3D20"
+    )
 
 
 FORMATS = {
-    "gismo": Format(".xml", gismo.write_gismo, ("_u.xml", gismo.write_gismo_field), gismo.read_gismo),
-    "mfem": Format(".mesh", mfem_writer.write_mfem, (".gf", mfem_writer.write_mfem_field), mfem.read_mfem),
+    "gismo": Format(
+        ".xml",
+        lambda path, given: gismo.write_gismo(path, given.body),
+        ("_u.xml", gismo.write_gismo_field),
+        gismo.read_gismo,
+    ),
+    "mfem": Format(
+        ".mesh",
+        lambda path, given: mfem_writer.write_mfem(path, given.body, given.solution),
+        (".gf", mfem_writer.write_mfem_field),
+        mfem.read_mfem,
+    ),
     "geopdes": Format(".txt", read=geopdes.read_geopdes),
-    "vtk": Format("_bezier.vtu", vtk.write_bezier),
-    "view": Format("_view.vtu", view.write_view),
-    "json": Format(".json", splinepy.write_json, ("_u.json", splinepy.write_json), splinepy.read_json),
+    "vtk": Format("_bezier.vtu", lambda path, given: vtk.write_bezier(path, given.body, given.solution)),
+    "view": Format("_view.vtu", _view, takes=("samples", "quantity")),
+    "json": Format(
+        ".json",
+        lambda path, given: splinepy.write_json(path, given.body),
+        ("_u.json", splinepy.write_json),
+        splinepy.read_json,
+    ),
+    "calculix": Format(".inp", _calculix, takes=("samples", "element")),
 }
 
 

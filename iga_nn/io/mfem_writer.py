@@ -18,9 +18,9 @@ import numpy as np
 from parameterize.arrays import Array, Floats, IntArray
 from parameterize.spline.body import Body, BodyLike, as_body, shared_numbers
 from parameterize.spline.interface import Interface, axis_side
-from parameterize.spline.orientation import hands_of, orientation
+from parameterize.spline.orientation import hands_of
 from parameterize.spline.volume import BSplineVolume
-from solve.field import SplineField
+from solve.field import FieldOnBody, SplineField
 
 from ..errors import InputError
 from .mfem import CUBE, HEADS, SQUARE, KnotVector
@@ -32,14 +32,14 @@ log = logging.getLogger(__name__)
 ATTRIBUTES = ("w0", "w1", "v0", "u1", "v1", "u0")  # the faces by their boundary attributes, from 1
 
 
-def write_mfem(path: Path, volume: BodyLike, solution: SplineField | None = None, *_: object) -> None:
+def write_mfem(path: Path, volume: BodyLike, solution: FieldOnBody | None = None, *_: object) -> None:
     """Write a volume or a body as an MFEM NURBS mesh, on the knots of the solution where there is one.
 
     Raises InputError where the degrees of the solution differ, or MFEM has no way to tell the edges of a body apart.
     """
     given = as_body(volume)
     if solution is not None:
-        given = Body((_on_knots_of(solution, given.patches[0]),))
+        given = _on_knots_of_all(solution, given)
     body = right_handed(given)
     if any(patch is not other for patch, other in zip(body, given, strict=True)):
         log.warning("the volume is left-handed, which MFEM does not take: written with w reversed, w0 and w1 exchanged")
@@ -69,15 +69,21 @@ def write_mfem(path: Path, volume: BodyLike, solution: SplineField | None = None
     path.write_text("\n".join([HEADS[0], *lines, "", *_space(3), as_text(rows)]) + "\n", encoding="utf-8")
 
 
-def write_mfem_field(path: Path, field: SplineField, volume: BSplineVolume) -> None:
+def write_mfem_field(path: Path, field: FieldOnBody, volume: BodyLike) -> None:
     """Write a solution as an MFEM grid function on the mesh that `write_mfem` makes of it and its volume."""
-    map_there = _on_knots_of(field, volume)
-    layout, knots = _layout_of(right_handed(Body((map_there,))))
-    (place,) = layout.numbers([len(row) - degree - 1 for degree, row in knots])
-    coefficients = _backwards(field.coefficients) if orientation(map_there) < 0 else field.coefficients
-    values = np.empty((place.size, int(np.prod(coefficients.shape[3:]))))
-    values[place] = coefficients.reshape(*place.shape, -1)
+    given = _on_knots_of_all(field, as_body(volume))
+    layout, knots = _layout_of(right_handed(given))
+    counts = [len(row) - degree - 1 for degree, row in knots]
+    own = [one.coefficients for one in field.patches]
+    values = np.empty((layout.size(counts), int(np.prod(own[0].shape[3:]))))
+    for coefficients, place, hand in zip(own, layout.numbers(counts), hands_of(given.groups), strict=True):
+        values[place] = (_backwards(coefficients) if hand < 0 else coefficients).reshape(*place.shape, -1)
     path.write_text("\n".join([*_space(values.shape[1]), as_text(values)]) + "\n", encoding="utf-8")
+
+
+def _on_knots_of_all(field: FieldOnBody, body: Body) -> Body:
+    """Return the same body with the knots of a solution on it. Raises InputError where the degrees differ."""
+    return Body(tuple(map(_on_knots_of, field.patches, body)), body.interfaces, body.solids)
 
 
 def _on_knots_of(field: SplineField, volume: BSplineVolume) -> BSplineVolume:
