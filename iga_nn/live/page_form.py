@@ -152,7 +152,7 @@ def in_words(problem_options: ProblemOptions) -> str:
             data = form[f"data {face}"]
             said.append(f"{kind} on {face}" + f": {data}" * bool(data))
     said += [
-        f"{name} on {', '.join(getattr(problem_options, name))}"
+        f"{name.replace('_', ' ')} on {', '.join(getattr(problem_options, name))}"
         for name in problem_options.on_regions()
         if name in form
     ]

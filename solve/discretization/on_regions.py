@@ -155,7 +155,7 @@ def demand_supports(
     if not problem.form.free_motions(np.zeros((3, 1))).size:
         return
     if area == 0.0:
-        raise ValueError("no support holds the body: give fix, roller, symmetry or spring")
+        raise ValueError("no support holds the body: give fix, roller, symmetry, spring or foundation")
     size = size_of(volumes)
     middle = processes.total(sum(face.x @ weights for face, weights in zip(faces, holding, strict=True))) / area
     moved = held = 0.0
