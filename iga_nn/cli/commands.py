@@ -317,6 +317,14 @@ def write_sample(name: str, /, *, out: ObjFile = None, force: Overwrite = False)
     _print(str(target))
 
 
+@app.command
+def materials() -> None:
+    """List the materials that --material knows, their numbers and where these stand."""
+    from ..options.materials import listed
+
+    _print(listed())
+
+
 @app.command(name="fetch")
 def fetch_model(name: str, /, *, out: ObjFile = None, force: Overwrite = False) -> None:
     """Write a published model as an OBJ file; download it where it is not at hand.

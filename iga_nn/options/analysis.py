@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 from ..errors import InputError, input_errors
 from ..type_check import Checked
 from . import texts
+from .materials import axes_of, materials_of, of_all
 from .space_check import check_level, check_space
 
 if TYPE_CHECKING:
-    from solve import Ask, Elasticity
+    from solve import Ask, Elasticity, Material
+
+MODULI = {"young": 1.0, "poisson_ratio": 0.3}  # in whose place a material stands, and their defaults
 
 
 @dataclass(frozen=True)
@@ -44,7 +47,14 @@ class ModesOptions(Checked):
         young: Young's modulus E; of several solids also one for each by its name, "steel: 210000, pad: 8", and of
             several patches "p0: 210, p1: 70".
         poisson_ratio: Poisson's ratio nu, as young.
-        density: mass per volume, in units that agree with those of E and of the volume, as young.
+        density: mass per volume, in units that agree with those of E and of the volume, as young; 1, or that of the
+            material.
+        material: material of the library by its name, such as steel (`iga-nn materials` lists them), in place of its
+            constants; of several solids also one for each, "body: steel, pad: rubber". Lengths are in mm then,
+            densities in t/mm³, and frequencies in hertz.
+        unit: unit of lengths of a material's numbers, mm or m.
+        first_axis: axis 1 of a material that differs along its axes, as in `run elasticity`.
+        second_axis: vector towards its axis 2, as first_axis.
         number: number of modes, from the lowest frequency on.
         fix: regions of the boundary that are held, as in `run elasticity`: "nz < -0.9", "face(x, y, z)", group:NAME,
             u0; without any the body is free, and its rigid motions are left out.
@@ -57,7 +67,11 @@ class ModesOptions(Checked):
 
     young: float | str = 1.0
     poisson_ratio: float | str = 0.3
-    density: float | str = 1.0
+    density: float | str | None = None
+    material: str | None = None
+    unit: Literal["mm", "m"] | None = None
+    first_axis: str | None = None
+    second_axis: str | None = None
     number: int = 6
     fix: tuple[str, ...] = ()
     roller: tuple[str, ...] = ()
@@ -79,7 +93,25 @@ class ModesOptions(Checked):
     @property
     def densities(self) -> Any:
         """Return the density, or that of each patch or solid. Raises InputError."""
+        if self.density is None:
+            found = self.materials()
+            return of_all({who: one.density for who, one in found.items()}) if found else 1.0
         return texts.numbers("--density", self.density)
+
+    def materials(self) -> dict[Any, Material]:
+        """Return the material of each solid or patch, of all of them by the key None. Raises InputError."""
+        return {} if self.material is None else materials_of(self.material, self.unit)
+
+    def _of_material(self) -> dict[str, Any]:
+        """Return the keywords of the law. Raises InputError for text that is refused, and for what does nothing."""
+        if self.material is None:
+            if self.first_axis or self.second_axis or self.unit:
+                raise InputError("--first-axis, --second-axis and --unit belong to --material: give it, too")
+            return {name: texts.numbers(f"--{name.replace('_', '-')}", getattr(self, name)) for name in MODULI}
+        if any(getattr(self, name) != default for name, default in MODULI.items()):
+            raise InputError("--material and --young or --poisson-ratio: give one of them, the material has its own")
+        axes = axes_of(self.first_axis, self.second_axis, self.materials().values())
+        return {"material": of_all(self.materials()), **axes}
 
     def problem(self) -> Elasticity:
         """Return the body, without loads. Raises InputError."""
@@ -92,10 +124,7 @@ class ModesOptions(Checked):
         free = {} if self.fix or self.roller else dict.fromkeys(FACE_NAMES, ["0"] * 3)
         with input_errors():
             check_modes(self.densities, self.number)
-            young, ratio = texts.numbers("--young", self.young), texts.numbers("--poisson-ratio", self.poisson_ratio)
-            return Elasticity(
-                traction=free, young=young, poisson_ratio=ratio, fix=self.fix or None, roller=self.roller or None
-            )
+            return Elasticity(traction=free, fix=self.fix or None, roller=self.roller or None, **self._of_material())
 
 
 def _range(text: str) -> list[int]:

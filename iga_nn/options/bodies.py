@@ -102,15 +102,18 @@ class BodyOptions(ProblemOptions, ABC):
         rows = ((words, section.get(name)) for name, words in names.items())
         return [(words, f"{value:g}" if isinstance(value, float) else value) for words, value in rows if value]
 
+    def density_given(self) -> Any:
+        """Return the density, or that of each patch or solid; None where it is not given. Raises InputError."""
+        return self.density if self.density is None else numbers("--density", self.density)
+
     def of_body(self) -> dict[str, Any]:
         """Return the keywords of the problem that these options state: its force per volume and its conditions.
 
         The force has that of gravity, acceleration and spin in it. Raises InputError for text that is refused.
         """
         force = by_patch("--body-force", self.body_force, lambda text: vector("--body-force", text))
-        density = self.density if not isinstance(self.density, str) else numbers("--density", self.density)
         mass = {
-            "density": density,
+            "density": self.density_given(),
             "gravity": vector("--gravity", self.gravity),
             "acceleration": vector("--acceleration", self.acceleration),
             "spin": None if self.spin is None else at_point("--spin", self.spin),

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal
 from ..errors import InputError, input_errors
 from . import texts
 from .bodies import BodyOptions
+from .materials import MaterialOptions
 from .problem import Formula, Row, Sheet
 from .space_check import check_space
 
@@ -19,8 +20,8 @@ MOST_ITERATIONS = 3000  # of an elastic body; a bracket held at one end takes 68
 
 
 @dataclass(frozen=True)
-class ElasticityOptions(BodyOptions):
-    """State linear elasticity of the volume as an isotropic body, and the meshes it is solved on.
+class ElasticityOptions(MaterialOptions):
+    """State linear elasticity of the volume, and the meshes it is solved on.
 
     A face is one of u0, u1, v0, v1, w0, w1: the image of u = 0, u = 1 and so on. A vector is three formulas in x, y, z
     or X, Y, Z (scaled to volume 1 about the middle), separated by semicolons, in quotes: "x*y;0;sin(z)"; 0 is the zero
@@ -32,10 +33,6 @@ class ElasticityOptions(BodyOptions):
         displacement: displacement on the faces without traction, a vector; zero where neither it nor exact is given.
         traction: faces where a traction is given, each as "FACE=VECTOR", FACE=0 for a face that is free, or FACE for
             the traction of the exact solution.
-        young: Young's modulus E; of several solids also one for each by its name, "steel: 210000, pad: 8", and of
-            several patches "p0: 210, p1: 70". The second solid is solid2 if it has no name; a name with a comma or a
-            colon stands in quotes.
-        poisson_ratio: Poisson's ratio nu, as young.
         formulation: "mixed" solves for displacement and pressure, as bodies that hardly change their volume need,
             "displacement" for the displacement alone; by default mixed where Poisson's ratio exceeds 0.45.
 
@@ -47,8 +44,6 @@ class ElasticityOptions(BodyOptions):
 
     displacement: Formula | None = None
     traction: tuple[str, ...] = ()
-    young: float | str = 1.0
-    poisson_ratio: float | str = 0.3
     formulation: Literal["mixed", "displacement"] | None = None
 
     section: ClassVar[str] = "elasticity"
@@ -58,8 +53,7 @@ class ElasticityOptions(BodyOptions):
         "an elastic body",
         "−div σ = f, small displacements. Click a face of the part for its region; the rest of its boundary is free.",
         (
-            ("young", "Young's modulus E", "1"),
-            ("poisson_ratio", "Poisson's ratio ν", "0.3"),
+            *MaterialOptions.material_fields,
             ("body_force", "Force per volume, three formulas", "0;0;0"),
             *BodyOptions.mass_fields,
             ("stress_unit", "Unit of stresses, such as MPa", "none"),
@@ -70,15 +64,13 @@ class ElasticityOptions(BodyOptions):
     @classmethod
     def law_of(cls, section: Mapping[str, Any]) -> list[Row]:
         """Return the equation with the material, Lame's constants too if there is one material, and the force."""
-        young, ratio = (section.get(name, getattr(cls, name)) for name in ("young", "poisson_ratio"))
-        said = (f"{value:g}" if isinstance(value, float | int) else value for value in (young, ratio))
-        material = "Young's modulus E = {}, Poisson's ratio ν = {}".format(*said)
-        if not isinstance(young, str) and not isinstance(ratio, str):
-            first, shear = young * ratio / ((1.0 + ratio) * (1.0 - 2.0 * ratio)), young / (2.0 * (1.0 + ratio))
-            material += f"; λ = {first:.6g}, μ = {shear:.6g}"
-        equation = "−∇·σ = f,  σ = λ (∇·u) I + μ (∇u + ∇uᵀ)"
-        force = section.get("body_force", "")
-        rows = [("equation", equation), ("material", material), ("force f per volume", force)]
+        rows = [] if section.get("materials") else [("material", _constants(section, cls))]
+        rows += cls.material_rows(section)
+        isotropic = "λ (∇·u) I + μ (∇u + ∇uᵀ)"
+        law = "C : ε" if any("shear_modulus" in own for own in (section, *section.get("materials", ()))) else isotropic
+        thermal = " − C : α ΔT" if section.get("temperature_change") else ""
+        equation = f"−∇·σ = f,  σ = {law}{thermal}"
+        rows = [("equation", equation), *rows, ("force f per volume", section.get("body_force", ""))]
         return [*rows, *cls.mass_rows(section)]
 
     def solve_options(self) -> SolveOptions:
@@ -113,9 +105,19 @@ class ElasticityOptions(BodyOptions):
                 exact=texts.vector("--exact", self.exact),
                 displacement=texts.vector("--displacement", self.displacement),
                 traction={face: texts.vector(f"--traction {face}", text) for face, text in traction.items()},
-                young=texts.numbers("--young", self.young),
-                poisson_ratio=texts.numbers("--poisson-ratio", self.poisson_ratio),
+                **self.of_material(),
                 **self.of_body(),
             )
         self.asks(body)
         return body
+
+
+def _constants(section: Mapping[str, Any], kind: type[ElasticityOptions]) -> str:
+    """Return the constants of a section of report.json in one line, with Lame's constants of one isotropic material."""
+    young, ratio = (section.get(name, getattr(kind, name)) for name in ("young", "poisson_ratio"))
+    said = (f"{value:g}" if isinstance(value, float | int) else value for value in (young, ratio))
+    material = "Young's modulus E = {}, Poisson's ratio ν = {}".format(*said)
+    if not isinstance(young, str) and not isinstance(ratio, str):
+        first, shear = young * ratio / ((1.0 + ratio) * (1.0 - 2.0 * ratio)), young / (2.0 * (1.0 + ratio))
+        material += f"; λ = {first:.6g}, μ = {shear:.6g}"
+    return material

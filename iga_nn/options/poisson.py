@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal  # noqa: F401  # Litera
 
 from ..errors import InputError, input_errors
 from . import texts
+from .materials import materials_of, of_all
 from .problem import Formula, ProblemOptions, Row, Sheet, by_patch
 from .space_check import check_space
 
 if TYPE_CHECKING:
-    from solve import Poisson
+    from solve import Material, Poisson
 
 
 @dataclass(frozen=True)
@@ -31,6 +32,9 @@ class PoissonOptions(ProblemOptions):
         kappa: one formula, or six separated by commas for a symmetric tensor: xx,xy,xz,yy,yz,zz; of several solids also
             an entry for each by its name, "steel: 50, pad: 0.2+x", and of several patches "p0: 1, p1: 2+x". The second
             solid is solid2 if it has no name; a name with a comma or a colon stands in quotes.
+        material: material of the library by its name, such as steel (`iga-nn materials` lists them), whose
+            conductivity is kappa; of several solids also one for each, "body: steel, pad: rubber". It is in W/(mm K),
+            with lengths in mm, or in W/(m K) with --unit m.
         reaction: c, a formula; of several solids also one for each, as kappa.
         neumann: faces with a given flux kappa du/dn, each as FACE=FORMULA, or FACE for the flux of the exact solution.
         robin: faces where kappa du/dn + alpha u = g, each as FACE=ALPHA:FORMULA, or FACE=ALPHA for the g of the exact
@@ -51,6 +55,7 @@ class PoissonOptions(ProblemOptions):
     source: Formula | None = None
     boundary: Formula | None = None
     kappa: Formula | None = None
+    material: str | None = None
     reaction: Formula | None = None
     neumann: tuple[str, ...] = ()
     robin: tuple[str, ...] = ()
@@ -68,6 +73,7 @@ class PoissonOptions(ProblemOptions):
         "−div(κ grad u) + c u = f. Formulas use x, y, z, in the surface's units, or X, Y, Z, scaled to volume 1.",
         (
             ("kappa", "Coefficient κ, one formula or six: xx,xy,xz,yy,yz,zz", "1"),
+            ("material", "Material by name, whose conductivity is κ, such as steel", "none"),
             ("reaction", "Reaction c", "0"),
             ("exact", "Exact solution u, from which empty data follow", "none; without a source exp(X+Z)*sin(Y)"),
             ("source", "Source f", "that of the exact solution"),
@@ -81,8 +87,45 @@ class PoissonOptions(ProblemOptions):
         """Return the equation with kappa, the reaction and the source."""
         reaction = section.get("reaction")
         rows = [("equation", f"−∇·(κ ∇u){' + c u' if reaction is not None else ''} = f")]
-        rows += [("κ", section.get("kappa", "1")), *([] if reaction is None else [("c", reaction)])]
+        kappas = [
+            (f"κ of {one['name']}", f"{one['conductivity']:g} ({one['source']})")
+            for one in section.get("materials", ())
+        ]
+        rows += [*(kappas or [("κ", section.get("kappa", "1"))]), *([] if reaction is None else [("c", reaction)])]
         return [*rows, ("f", section.get("source", ""))]
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.material is not None:
+            if self.kappa is not None:
+                raise InputError("--material and --kappa: give one of them, the material has its own conductivity")
+            for one in self.materials().values():
+                if one.conductivity is None:
+                    raise InputError(f"--material {one.name}: its conductivity is not known: give --kappa")
+                if isinstance(one.conductivity, tuple):
+                    along = ",".join(f"{part:g}" for part in one.conductivity)
+                    raise InputError(
+                        f"--material {one.name}: it conducts {along} along its axes: give --kappa as a tensor, "
+                        "xx,xy,xz,yy,yz,zz"
+                    )
+
+    def materials(self) -> dict[Any, Material]:
+        """Return the material of each solid or patch, of all of them by the key None. Raises InputError."""
+        return {} if self.material is None else materials_of(self.material, self.unit)
+
+    def values(self, *left_out: str) -> dict[str, Any]:
+        """Return the options by name, with the unit of lengths and the numbers of materials."""
+        found = super().values(*left_out)
+        if self.material is None:
+            return found
+        own = {"unit": next(iter(self.materials().values())).unit} if "unit" in found else {}
+        return {**found, **own, "materials": [one.as_dict() for one in self.materials().values()]}
+
+    def _kappa(self) -> Any:
+        """Return kappa, or that of each solid or patch. Raises InputError."""
+        if self.material is None:
+            return by_patch("--kappa", self.kappa, _entries)
+        return of_all({who: one.conductivity for who, one in self.materials().items()})
 
     def problem(self) -> Poisson:
         """Return the problem of these options. Raises InputError."""
@@ -100,7 +143,7 @@ class PoissonOptions(ProblemOptions):
                 exact=self.exact,
                 source=by_patch("--source", self.source, str),
                 boundary=self.boundary,
-                kappa=by_patch("--kappa", self.kappa, _entries),
+                kappa=self._kappa(),
                 reaction=by_patch("--reaction", self.reaction, str),
                 neumann=texts.faces("neumann", self.neumann),
                 robin=robin,

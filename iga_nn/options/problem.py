@@ -65,7 +65,8 @@ class ProblemOptions(Checked, ABC):
         quadrature: quadrature rule of the operator: "gauss+1", degree + 1 Gauss points a span; "gauss", degree points a
             span; "spline", the fewest points with the same error as "gauss+1".
         solve_anyway: solve also on a map that folds, or that is too far from its surface to stand for the part.
-        unit: unit of lengths, such as mm; free text that is shown behind lengths and places and changes no number.
+        unit: unit of lengths, such as mm; free text that is shown behind lengths and places and changes no number but
+            those of a material, which are in mm and MPa, or in m and Pa.
         ask: quantities to answer with intervals, which reports show first, each as "ux at (10, 0, 0)", "von_mises max
             over REGION", "mean T over REGION", "integral u", "reaction z of REGION", "flow over REGION" or "energy". A
             region that is a condition on position alone is a part of the body, any other a part of its boundary.

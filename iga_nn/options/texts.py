@@ -116,6 +116,20 @@ def numbers(flag: str, given: float | str) -> Any:
     return given if not isinstance(given, str) else by_patch(flag, given, lambda text: number(flag, text))
 
 
+def constants(flag: str, given: float | str | None) -> Any:
+    """Return a number, or three of them with semicolons between, also those of each solid. Raises InputError."""
+
+    def read(text: str) -> Any:
+        parts = [number(flag, part) for part in text.split(";")]
+        if len(parts) not in (1, 3):
+            raise InputError(
+                f"{flag} {text!r:.80}: give one number, or three with semicolons along the material's axes"
+            )
+        return parts[0] if len(parts) == 1 else tuple(parts)
+
+    return given if not isinstance(given, str) else by_patch(flag, given, read)
+
+
 def number(flag: str, text: str) -> float:
     """Return the number of a text. Raises InputError for another text."""
     try:

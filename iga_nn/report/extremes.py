@@ -20,6 +20,7 @@ SAYINGS = {  # quantity -> its words, the extreme that they name, and the sectio
     "volume_ratio": ("ratio of volumes J at least", "least", ""),
     "first_principal": ("largest principal stress", "largest", "stress_unit"),
     "third_principal": ("smallest principal stress", "least", "stress_unit"),
+    "safety": ("smallest safety against yield", "least", ""),
     "gradient_magnitude": ("|gradient| at most", "largest", ""),
     "flux_magnitude": ("|flux| at most", "largest", ""),
 }

@@ -4,7 +4,7 @@ import logging
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import asdict, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -129,7 +129,7 @@ def section_of(
 
 def _peaks(problem_options: ProblemOptions, problem: BoundaryValueProblem, done: Levels) -> list[str]:
     """Return the notices on where stresses are infinite or yet grow; none where the exact solution is known."""
-    return peak_notices({**asdict(problem_options), "levels": done.entries}) if problem.exact is None else []
+    return peak_notices({**problem_options.values(), "levels": done.entries}) if problem.exact is None else []
 
 
 def _show(

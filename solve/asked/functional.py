@@ -256,7 +256,10 @@ def _made(ask: Ask, problem: BoundaryValueProblem, body: Body, is_excluded: Excl
         return Flow(ask, part, "into the body, by quadrature of the flux")
     part.demand_some()
     if ask.kind == "energy":
-        return Integral(ask, part, "1/2 a(u, u), the energy inside the body")
+        thermal = "half of stress times strain, without the thermal strain"
+        return Integral(
+            ask, part, thermal if problem.form.has_initial_flux else "1/2 a(u, u), the energy inside the body"
+        )
     where = "" if region is None else f"over a part of the {'boundary' if on_boundary else 'body'}"
     if ask.kind in ("mean", "integral"):
         return Integral(ask, part, where)
