@@ -36,6 +36,8 @@ BODY = (
 )
 STEPS = BODY | {"refine": (2,), "degree": 2, "quadrature": "gauss", "steps": 3}
 LOADED = {"body_force": "2;2;2", "density": 1.0, "gravity": "0;0;1", "fix": ("y < 1",)}
+ORTHOTROPIC = {"young": "3;2;2", "poisson_ratio": "0.2;0.2;0.2", "shear_modulus": "1;1;0.83333333"}
+ORTHOTROPIC |= {"alpha": 1e-5, "temperature_change": "20"}
 OTHERS = {
     PlasticOptions(**LOADED): STEPS | {"young": 2.0, "poisson_ratio": 0.2, "yield_stress": 3.0, "hardening": 1.0},
     FiniteOptions(**LOADED): STEPS | {"shear": 2.0, "bulk": 9.0},
@@ -47,9 +49,11 @@ OTHERS = {
     | SCALAR
     | {"neumann": ("u1=1",), "robin": ("u1=1:1",), "value": ("x < 1=1",), "flux": ("x < 1=1",)}
     | {"exchange": ("x < 1=1:1",)},
-    ElasticityOptions(body_force="2;2;2", density=1.0, gravity="0;0;1"): SPACE
+    ElasticityOptions(body_force="2;2;2", density=1.0, gravity="0;0;1", **ORTHOTROPIC): SPACE
     | VECTOR
-    | {"traction": ("u1=1;1;1",), "young": 2.0, "poisson_ratio": 0.25, "formulation": "mixed"}
+    | {"traction": ("u1=1;1;1",), "young": "4;2;2", "poisson_ratio": "0.1;0.2;0.2", "formulation": "mixed"}
+    | {"shear_modulus": "1;2;1", "first_axis": "0;1;0", "second_axis": "0;1;1", "yield_strength": 3.0}
+    | {"alpha": 2e-5, "temperature_change": "30"}
     | BODY,
 }
 

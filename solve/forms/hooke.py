@@ -65,12 +65,13 @@ class Hooke:
 
     def demand_the_same_across(self) -> None:
         """Raise ValueError unless the material is the same in all directions across its first axis."""
-        given = (self.young, self.poisson_ratio, self.shear_modulus, self.expansion)
         alike = is_the_same_across(self._along_axes)
         if isinstance(self.expansion, tuple):
             alike = alike and self.expansion[1] == self.expansion[2]
         if not alike:
-            raise ValueError(f"second_axis is needed: the material differs across its first axis, {given}")
+            raise ValueError(
+                "second_axis is needed: the material differs across its first axis; give both, at an angle"
+            )
 
     @property
     def is_isotropic(self) -> bool:
