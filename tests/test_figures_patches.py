@@ -16,6 +16,7 @@ from iga_nn.figures import map as map_figures
 from iga_nn.figures import render as rendering
 from iga_nn.figures import solution as solution_figures
 from iga_nn.figures.fields import all_grids, outer_faces, points_on
+from iga_nn.figures.outline import is_by_face, smooth_colors
 from parameterize.certificate.boundary import Meeting
 from parameterize.spline.volume import FACE_NAMES
 
@@ -87,10 +88,12 @@ def test_the_half_beyond_a_plane_is_left_out():
 
 
 def test_each_patch_has_a_colour_and_many_share_them():
-    few, many = ring(3), ring(45, shape=(3, 3, 2), degrees=(2, 2, 1))
+    few, many, more = (ring(count, shape=(3, 3, 2), degrees=(2, 2, 1)) for count in (3, 25, 45))
     assert [label for _, label in colors.color_labels(few)] == ["p0", "p1", "p2"]
     labels = [label for _, label in colors.color_labels(many)]
-    assert len(labels) == 20 and labels[0] == "p0, p20, p40" and labels[-1] == "p19, p39"
+    assert len(labels) == 20 and labels[0] == "p0, p20" and labels[-1] == "p19"
+    assert colors.color_labels(more) == [] and is_by_face(more) and not is_by_face(many)
+    assert len(set(smooth_colors(more))) == 4  # inner and outer wall, lid and floor
 
 
 def test_distortion_measures_each_patch_in_its_own_box():

@@ -48,11 +48,26 @@ def test_the_form_lists_the_options_of_each_problem_and_the_faces():
     assert [problem["name"] for problem in known["problems"]] == ["poisson", "elasticity"]
     names = []
     for problem in known["problems"]:
-        own = [field["name"] for field in problem["fields"] + problem["lists"]]
+        own = [field["name"] for field in problem["fields"] + problem["lists"] + problem["more"]]
         assert set(own) <= set(PROBLEMS[problem["name"]].__dataclass_fields__)
         names += own
     assert len(set(names)) == len(names)  # the fields of both stand in one form
     assert [face["name"] for face in known["faces"]] == ["u0", "u1", "v0", "v1", "w0", "w1"]
+
+
+def test_asks_stand_one_a_line_and_are_refused_by_name():
+    form = {"exact": "x", "ask": "u at (0.5, 0.5, 0.5)\n\nintegral u", "unit": "mm"}
+    found = stated(form, KEPT)
+    assert found.ask == ("u at (0.5, 0.5, 0.5)", "integral u") and filled(found)["ask"].count("\n") == 1
+    with pytest.raises(InputError, match="nonsense"):
+        stated({"exact": "x", "ask": "nonsense"}, KEPT)
+
+
+def test_every_list_of_regions_is_seen_or_one_of_the_more():
+    for problem in described()["problems"]:
+        names = [field["name"] for field in problem["lists"] + problem["more"]]
+        assert names and sorted(names) == sorted(PROBLEMS[problem["name"]].on_regions())
+        assert 2 <= len(problem["lists"]) <= 5 and problem["asks"]
 
 
 def test_lists_of_regions_have_an_entry_a_line():

@@ -10,6 +10,7 @@ import pytest
 from browser import browse
 from matplotlib.colors import rgb_to_hsv, to_rgb
 
+import iga_nn
 import solve
 from iga_nn.cli.commands import main
 from iga_nn.figures.colors import FACE_COLORS
@@ -199,3 +200,64 @@ def test_the_solution_stands_first(result):
     if "The solution on the boundary and inside" in text:
         assert text.index("<figure>") > text.index("<h2>The solution on the boundary and inside</h2>")
         assert text.index("<figure>") < text.index("<h2>Errors over the mesh size</h2>")
+
+
+@pytest.fixture(scope="module")
+def loaded(tmp_path_factory):
+    """The folder of a solve of a clamped beam, with regions, an ask and units."""
+    folder = tmp_path_factory.mktemp("loaded")
+    iga_nn.BSplineVolume.from_function(lambda u, v, w: (4.0 * u, v, w), (5, 4, 4)).save(folder / "beam.npz")
+    given = ["--fix", "nx < -0.9", "--load", "nx > 0.9=0;0;-1", "--unit", "mm", "--stress-unit", "MPa", "--refine", "0"]
+    arguments = [*given, "--ask", "uz at (4, 0.5, 0.5)", "--quiet", "--out", str(folder / "out")]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("iga_nn.figures.render.can_draw", lambda: False)
+        assert main(["solve", "elasticity", str(folder / "beam.npz"), *arguments]) == 0
+    return folder / "out"
+
+
+def test_what_was_asked_stands_before_a_good_verdict(loaded):
+    text = (loaded / "report.html").read_text()
+    assert 0 < text.index("What was asked") < text.index(VERDICT) < text.index("In short")
+
+
+LAYERS = """(() => {
+  const shot = () => document.getElementById("view").toDataURL(), found = [shot()];
+  for (const name of ["lined", "edges", "blocks", "regions", "singular"]) {
+    document.getElementById(name).click();
+    found.push(shot());
+  }
+  return new Set(found).size;
+})()"""
+
+
+@pytest.mark.parametrize("width", [1400, 400])
+def test_layers_of_the_view_are_switched_and_named(in_browser, loaded, tmp_path, width):
+    async def look(browser):
+        tab = await browser.open((loaded / "report.html").as_uri())
+        await tab.picture(tmp_path / "page.png", width=width)
+        legend = await tab.value("document.getElementById('layers').innerText")
+        assert "fix: nx < -0.9" in legend and "load: nx > 0.9 = 0;0;-1" in legend and "infinite at" in legend
+        assert "99 % of the body away from singular places; largest" in await tab.value(
+            "document.getElementById('legend').innerText"
+        )
+        assert await tab.value(LAYERS) == 6  # each layer changes the picture
+        assert await tab.value("document.getElementById('layers').innerText") == ""
+        assert await tab.value("document.documentElement.scrollWidth") <= width
+        assert tab.complaints == []
+
+    in_browser(look)
+
+
+def test_one_page_is_printed_to_sign(in_browser, loaded):
+    async def print_it(browser):
+        tab = await browser.open((loaded / "report.html").as_uri())
+        await tab.until("document.readyState === 'complete'")
+        pdf = base64.b64decode((await tab.call("Page.printToPDF", preferCSSPageSize=True))["data"])
+        assert len(re.findall(rb"/Type\s*/Page\b", pdf)) == 1
+        await tab.call("Emulation.setEmulatedMedia", media="print")
+        sheet = await tab.text()
+        for words in ("SHA-256", "certified", "Supports and loads", "uz at (4, 0.5, 0.5)", "between", "Signature"):
+            assert words in sheet
+        assert "The command that repeats this" not in sheet
+
+    in_browser(print_it)

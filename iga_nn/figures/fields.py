@@ -160,7 +160,7 @@ class ColoredField(Samples):
 
     def said(self, units: Units) -> str:
         """Return what the range of the colours is, "" where it is that of all values."""
-        return self.limits.said(self.unit(units), units.displacement)
+        return self.limits.said(self.unit(units), units.length)
 
     @classmethod
     def ranging(cls, samples: Samples, name: str, title: str) -> Self:

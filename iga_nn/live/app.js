@@ -54,16 +54,33 @@ async function pick(number, hit) {
 }
 
 // Writes a region into the list of the chosen problem that was chosen last; what is typed next are its data.
+let entered = null;  // the list of the last entry, and its text before and after
 function enter(region) {
   const form = document.querySelector("form"), lists = form?.querySelectorAll(`.${form.elements.problem.value} textarea`) ?? [];
   const list = [...lists].find((one) => one === aimed) ?? lists[0];
-  if (!list) return;
-  const before = list.value.trimEnd(), after = list.dataset.after;
-  list.value = `${before}${before && "\n"}${region}${after}`;
+  if (list) enterIn(list, region);
+}
+
+function enterIn(list, entry) {
+  const before = list.value.trimEnd(), after = list.dataset.after, old = list.value;
+  list.value = `${before}${before && "\n"}${entry}${after}`;
+  entered = {list, old, now: list.value};
   list.dispatchEvent(new Event("input", {bubbles: true}));
-  list.closest("details").open = true;
+  for (let part = list.closest("details"); part; part = part.parentElement.closest("details")) part.open = true;
   list.focus({preventScroll: true});
   list.setSelectionRange(list.value.length - after.length + after.startsWith("="), list.value.length);
+}
+
+// Gives the picked face a support, a load or an ask, in place of what the click entered.
+function give(select) {
+  const form = document.querySelector("form"), region = window.trame.state.get("picked")?.region;
+  const [, problem, words] = select.value.match(/^ask (\w+) (.*)$/) ?? [null, form?.elements[select.value]?.dataset.problem, ""];
+  select.value = select.value && form && region ? select.value : "";
+  if (!select.value) return;
+  if (entered && entered.list.value === entered.now) entered.list.value = entered.old;
+  form.querySelector(`[name=problem][value=${problem}]`).click();
+  enterIn(form.elements[words ? "ask" : select.value], words ? `${words} ${region}` : region);
+  select.value = "";
 }
 
 // Sends the form of a problem; what the server says against it is shown in the form.

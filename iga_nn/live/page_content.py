@@ -71,6 +71,7 @@ def row(job: Job, before: int, problem_options: ProblemOptions) -> dict[str, Any
     if job.surface is not None:
         vertices, faces = len(job.surface.vertices), len(job.surface.faces)
         said["size"] = f"{vertices:,} vertices, {faces:,} faces"
+        said["unit"] = job.surface.unit
         said["edges"] = faces <= EDGES_UP_TO
         said["notices"] = list(job.surface.notices)
     if job.progress is not None:

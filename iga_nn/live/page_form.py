@@ -12,7 +12,10 @@ from ..figures.colors import FACE_COLORS, face_labels
 from ..options import PROBLEMS, PoissonOptions, ProblemOptions
 
 _OPTION = re.compile(r"^ {8}(\w+): (.*(?:\n {12}.*)*)", re.MULTILINE)  # of the docstring of options
-UNIT = ("unit", "Unit of lengths, such as mm", "none")  # of every problem
+UNIT = ("unit", "Unit of lengths, such as mm", "none")  # of every problem, as ASK
+ASK = ("ask", "Quantities to answer with intervals", "von_mises max over REGION, or uz at (1, 0, 0), one a line")
+USUAL = ("fix", "load", "pressure", "total_force", "value", "flux", "exchange")  # lists that are seen at first
+OF_FACE = {"poisson": ("flow over", "mean u over"), "elasticity": ("von_mises max over", "reaction z of")}  # asks
 
 
 EXCHANGE = "exchange"  # the other kind of data of a face of the cube is "flux"
@@ -26,7 +29,9 @@ def described() -> dict[str, Any]:
             "title": kind.sheet.title,
             "equation": kind.sheet.equation,
             "fields": [_named(field) for field in kind.sheet.fields],
-            "lists": [_named(field) for field in _lists(kind)],
+            "lists": [field for field in lists_of(kind) if field["name"] in USUAL],
+            "more": [field for field in lists_of(kind) if field["name"] not in USUAL],
+            "asks": OF_FACE.get(name, ()),
         }
         for name, kind in PROBLEMS.items()
     ]
@@ -34,8 +39,14 @@ def described() -> dict[str, Any]:
     return {
         "problems": sheets,
         "common": [_named(UNIT)],
+        "ask": _named(ASK),
         "faces": [{"name": name, "label": label, "color": color} for name, label, color in faces],
     }
+
+
+def lists_of(kind: type[ProblemOptions]) -> list[dict[str, str]]:
+    """Return the lists of regions with data of a problem's form."""
+    return [_named(field) | {"short": field[0].replace("_", " ")} for field in _lists(kind)]
 
 
 def _named(field: tuple[str, ...]) -> dict[str, str]:
@@ -76,7 +87,7 @@ def stated(form: Mapping[str, Any], problem_options: ProblemOptions, *, has_face
         given[field] = _text(form, field) or None
         if isinstance(getattr(kind, field), float):
             given[field] = _number(title, empty, given[field])
-    for field in kind.on_regions():
+    for field in (*kind.on_regions(), ASK[0]):
         given[field] = tuple(filter(None, map(str.strip, _text(form, field).splitlines())))
     if has_faces and "robin" in kind.on_faces:
         given["neumann"], given["robin"] = _of_faces(form)
@@ -129,7 +140,9 @@ def filled(problem_options: ProblemOptions) -> dict[str, str]:
     known = ((name, getattr(problem_options, name)) for name, _, _ in (*problem_options.sheet.fields, UNIT))
     form |= {name: f"{value:.12g}" if isinstance(value, float) else value for name, value in known if value}
     form |= {
-        name: "\n".join(lines) for name in problem_options.on_regions() if (lines := getattr(problem_options, name))
+        name: "\n".join(lines)
+        for name in (*problem_options.on_regions(), ASK[0])
+        if (lines := getattr(problem_options, name))
     }
     if not isinstance(problem_options, PoissonOptions):
         return form

@@ -87,8 +87,8 @@ class BodyOptions(ProblemOptions, ABC):
 
     @property
     def units(self) -> Units:
-        """Return the units for colour bars."""
-        return Units(self.unit, self.stress_unit)
+        """Return the units for colour bars and places."""
+        return Units(self.unit, self.stress_unit, self.unit)
 
     @property
     def is_loaded(self) -> bool:

@@ -26,10 +26,11 @@ LONGEST_UNIT = 20  # letters
 
 @dataclass(frozen=True)
 class Units:
-    """Hold the units of a solution and of stresses, None for a unit that is not given."""
+    """Hold the units of a solution, of stresses and of lengths, None for a unit that is not given."""
 
     displacement: str | None = None
     stress: str | None = None
+    length: str | None = None
 
 
 NO_UNITS = Units()
@@ -170,8 +171,8 @@ class ProblemOptions(Checked, ABC):
 
     @property
     def units(self) -> Units:
-        """Return the units for colour bars."""
-        return NO_UNITS
+        """Return the units for colour bars and places."""
+        return Units(length=self.unit)
 
     def solve_options(self) -> SolveOptions:
         """Return the options of the solve on the finest mesh. Raises InputError for an ask that is refused."""

@@ -231,7 +231,8 @@ def volume_in_words(report: Report) -> tuple[str, ...]:
         return ()
     share, sense = abs(volume["difference"]), "less" if volume["difference"] < 0.0 else "more"
     beside = f"{in_percent(share)} {sense} than the mesh's" if share > SAME_VOLUME else "as the mesh's"
-    return f"{volume['spline']:.6g}", beside
+    unit = report.get("input", {}).get("unit") or solved(report).get("unit")
+    return f"{volume['spline']:.6g}{f' {unit}³' if unit else ''}", beside
 
 
 def patches_of_solid(solid: Report) -> str:

@@ -24,6 +24,7 @@ from . import document as reports
 from .advice import in_words
 from .artifacts import PAGE, REGIONS, SOLVED, figures_of
 from .document import Report
+from .sheet import sheet_of
 from .statement import regions_of, statement_of
 
 log = logging.getLogger(__name__)
@@ -70,9 +71,11 @@ def page(report: Report, scene: dict[str, Any] | None, folder: Path) -> str:
     what = next((title for name, title in SOLVED.items() if name in report), "spline volume")
     return filled(
         "report/page.html",
-        title=f"{Path(report['input']['file']).name}: {what}",
+        title=f"{name_of(report)}: {what}",
         report=report,
         verdicts=verdicts(report),
+        sheet=sheet_of(report),
+        files=[file for file, _, _ in drawn],
         asked=asked.facts(report),
         facts=_facts(report),
         scene=scene,
@@ -84,12 +87,17 @@ def page(report: Report, scene: dict[str, Any] | None, folder: Path) -> str:
         patches=_patches(report["parameterization"]),
         patches_heading=reports.patches_heading(report["parameterization"]),
         notices=notices(report),
-        figures=[(heading, image) for file, heading, image in drawn if file != REGIONS],
-        where=[(heading, image) for file, heading, image in drawn if file == REGIONS],
+        figures=[one for one in drawn if one[0] != REGIONS],
+        where=[one for one in drawn if one[0] == REGIONS],
         balance=balance.table(section),
         balance_heading=balance.heading(section),
         details=_details(report),
     )
+
+
+def name_of(report: Report) -> str:
+    """Return the name of the part, or of the volume's file where the part is not known."""
+    return Path(report["input"].get("part") or report["input"]["file"]).name
 
 
 def filled(template: str, **content: Any) -> str:

@@ -107,7 +107,7 @@ def scene_of(
     units: the units in the titles of the bars. coarser: 1 for all points, 2 for every second point.
     """
     if solution is None or not all(np.all(np.isfinite(field.coefficients)) for field in solution.patches):
-        return _scene(body, [Frame("", [])], coarser) | {"unit": units.displacement or ""}
+        return _scene(body, [Frame("", [])], coarser) | {"unit": units.length or ""}
     if isinstance(solution, BodyField) and solution.body is None:  # as a file holds it
         solution = replace(solution, body=as_body(body))
     frame = Frame.of("", solution)
@@ -116,7 +116,7 @@ def scene_of(
     return (
         _scene(body, [frame], coarser, solution, units)
         | {"warp": warp_of(solution, points_of(body).diagonal)}
-        | {"unit": units.displacement or ""}
+        | {"unit": units.length or ""}
     )
 
 

@@ -62,6 +62,7 @@ from .regions import check_asks
 from .solving import (
     described,
     each_level,
+    in_units,
     moving_scene_of,
     notices_of,
     reported,
@@ -220,7 +221,7 @@ def _solved(
         with closing():
             return _finish(state, body)
     with closing():
-        return _finish(state, body, solution, problem, problem_options.units)
+        return _finish(state, body, solution, problem, in_units(state, problem_options).units)
 
 
 def _command(

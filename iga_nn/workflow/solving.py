@@ -49,7 +49,7 @@ def solve_levels(
     the levels with what is done; it raises OutOfTime only if nothing is. kept: the levels
     of an interrupted run, and the place for those of this one; None where no run can go on from them.
     """
-    options = replace(options, certified=verdict_of(state))
+    options, problem_options = replace(options, certified=verdict_of(state)), in_units(state, problem_options)
     done = kept.load(body, problem) if kept else Levels()
     if done.refine:
         state.write(**{problem_options.section: section_of(problem_options, problem, body, done)})
@@ -227,6 +227,12 @@ def reported(
         state.wait_for_figures()
         html.write(state.folder, reports.plain(state.report | {"seconds": state.seconds}), scene)
         raise
+
+
+def in_units(state: RunFolder, problem_options: ProblemOptions) -> ProblemOptions:
+    """Return options with the unit of lengths of the input's file, where they name none."""
+    given = state.report.get("input", {}).get("unit")
+    return replace(problem_options, unit=given) if given and problem_options.unit is None else problem_options
 
 
 def verdict_of(state: RunFolder) -> str:

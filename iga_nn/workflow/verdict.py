@@ -41,11 +41,19 @@ def write_certificate(
     state.write(
         command=command,
         **({} if identity is None else {"identity": identity}),
-        input={"file": str(path), "sha256": digest(path)},
+        input={"file": str(path), "sha256": digest(path), **_of_part(path)},
         versions=reports.versions(),
         parameterization=facts,
     )
     tell(state)
+
+
+def _of_part(path: Path) -> dict[str, Any]:
+    """Return the unit of the part that a saved volume was made of, and the part's file, where its run is at hand."""
+    report = reports.read(path.parent) if path.name == "volume.npz" else None
+    known = (report or {}).get("input", {})
+    found = {"unit": known.get("unit"), "part": known.get("part") or known.get("file")}
+    return {name: value for name, value in found.items() if value}
 
 
 def facts_of_file(path: Path, body: BodyLike) -> dict[str, Any]:

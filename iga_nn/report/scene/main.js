@@ -203,3 +203,15 @@ window.addEventListener("message", ({data}) => {
   if (["light", "dark"].includes(data?.theme)) document.documentElement.style.colorScheme = data.theme;
 });
 if (window.parent !== window) window.parent.postMessage({scene: "ready"}, "*");
+
+// The sheet that is printed shows pictures of the page. The whole report is printed by its button alone.
+for (const copy of document.querySelectorAll("img[data-of]")) {
+  const picture = document.querySelector(`img[data-file="${copy.dataset.of}"]`);
+  if (picture) copy.src = picture.src;
+}
+element("print-sheet")?.addEventListener("click", () => window.print());
+element("print-all")?.addEventListener("click", () => {
+  document.documentElement.classList.add("whole");
+  window.print();
+  document.documentElement.classList.remove("whole");
+});
