@@ -24,7 +24,7 @@ async function post(address, body) {
 // Starts a job with the problem that its form states, where it has one.
 async function start(number) {
   const form = document.querySelector("form");
-  const wrong = await post(`start/${number}`, new URLSearchParams(form ? new FormData(form) : ""));
+  const wrong = await post(`start/${number}`, form ? statedBy(form) : new URLSearchParams());
   if (!wrong) sessionStorage.removeItem(kept(`form ${number}`));  // the job has it now
   if (!form) return;
   form.querySelector("[role=alert]").textContent = wrong;
@@ -71,25 +71,43 @@ function enterIn(list, entry) {
   list.setSelectionRange(list.value.length - after.length + after.startsWith("="), list.value.length);
 }
 
+// Offers what the picked face may be: the lists and the asks of the chosen problem.
+function offer(select) {
+  const form = document.querySelector("form"), problems = window.trame.state.get("problems");
+  const {lists, more, asks} = problems.find((one) => one.name === form.elements.problem.value);
+  const option = (value, text, title = "") => Object.assign(document.createElement("option"), {value, text, title});
+  const entries = [...lists, ...more].map((field) => option(field.name, field.short, field.title));
+  select.replaceChildren(select.options[0], ...entries, ...asks.map((words) => option(`ask ${words}`, `ask: ${words} it`)));
+}
+
 // Gives the picked face a support, a load or an ask, in place of what the click entered.
 function give(select) {
-  const form = document.querySelector("form"), region = window.trame.state.get("picked")?.region;
-  const [, problem, words] = select.value.match(/^ask (\w+) (.*)$/) ?? [null, form?.elements[select.value]?.dataset.problem, ""];
-  select.value = select.value && form && region ? select.value : "";
-  if (!select.value) return;
-  if (entered && entered.list.value === entered.now) entered.list.value = entered.old;
-  form.querySelector(`[name=problem][value=${problem}]`).click();
-  enterIn(form.elements[words ? "ask" : select.value], words ? `${words} ${region}` : region);
+  const form = document.querySelector("form"), region = window.trame.state.get("picked")?.region, value = select.value;
   select.value = "";
+  if (!value || !form || !region) return;
+  if (entered && entered.list.value === entered.now) entered.list.value = entered.old;
+  const words = value.startsWith("ask ") ? value.slice(4) : "";
+  if (words) enterIn(form.elements.ask, `${words} ${region}`);
+  else enterIn(form.querySelector(`.${form.elements.problem.value} [name=${value}]`), region);
+}
+
+// What a form states of its chosen problem; fields of the other ones may have the same names.
+function statedBy(form) {
+  const found = new FormData(form), chosen = form.elements.problem.value;
+  for (const field of form.elements) {
+    const of = field.closest(".of");
+    if (of?.classList.contains(chosen) && ["textarea", "text"].includes(field.type)) found.set(field.name, field.value);
+  }
+  return new URLSearchParams(found);
 }
 
 // Sends the form of a problem; what the server says against it is shown in the form.
 async function solve(number, form) {
-  form.querySelector("[role=alert]").textContent = await post(`solve/${number}`, new URLSearchParams(new FormData(form)));
+  form.querySelector("[role=alert]").textContent = await post(`solve/${number}`, statedBy(form));
 }
 
 function draft(number, form) {
-  sessionStorage.setItem(kept(`form ${number}`), new URLSearchParams(new FormData(form)));
+  sessionStorage.setItem(kept(`form ${number}`), statedBy(form));
 }
 
 // Fills a form with what was typed into it before, else with the problem that the job has solved.

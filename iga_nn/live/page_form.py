@@ -15,7 +15,10 @@ _OPTION = re.compile(r"^ {8}(\w+): (.*(?:\n {12}.*)*)", re.MULTILINE)  # of the 
 UNIT = ("unit", "Unit of lengths, such as mm", "none")  # of every problem, as ASK
 ASK = ("ask", "Quantities to answer with intervals", "von_mises max over REGION, or uz at (1, 0, 0), one a line")
 USUAL = ("fix", "load", "pressure", "total_force", "value", "flux", "exchange")  # lists that are seen at first
-OF_FACE = {"poisson": ("flow over", "mean u over"), "elasticity": ("von_mises max over", "reaction z of")}  # asks
+OF_FACE = {
+    "poisson": ("flow over", "mean u over"),
+    "elasticity": ("von_mises max over", "reaction z of"),
+}  # asks of a face
 
 
 EXCHANGE = "exchange"  # the other kind of data of a face of the cube is "flux"
