@@ -346,6 +346,36 @@ def test_an_elastic_body_is_held_and_loaded_by_clicks(in_browser, page, tmp_path
     in_browser(lambda browser: bend(browser, page, tmp_path))
 
 
+@pytest.mark.slow
+def test_a_clicked_face_is_given_a_moment_and_an_ask(in_browser, page, tmp_path):
+    in_browser(lambda browser: give(browser, page, tmp_path))
+
+
+GIVEN = """((value) => {
+  const select = document.querySelector(".give select");
+  select.dispatchEvent(new Event("focus"));
+  select.value = value;
+  select.dispatchEvent(new Event("change"));
+  const lists = [...document.querySelectorAll("form textarea")].filter((one) => one.value);
+  return lists.map((one) => one.name + ": " + one.value);
+})('%s')"""
+
+
+async def give(browser, port, folder):
+    """What the click entered moves to the list that is chosen, and the form states the chosen problem alone."""
+    tab = await with_box(browser, port, folder / "given.obj")
+    await tab.value("document.querySelector('form [value=elasticity]').click()")
+    turned = await clicked_face(tab, folder, 1280, (0.06, 0.06))
+    assert await tab.value(GIVEN % "moment") == [f"moment: {turned}=0;0;0"]
+    seen = await clicked_face(tab, folder, 1280, (-0.18, 0.04))
+    lists = await tab.value(GIVEN % "ask von_mises max over")
+    assert lists == [f"moment: {turned}=0;0;0", f"ask: von_mises max over {seen}"]
+    stated = await tab.value("[...statedBy(document.querySelector('form'))].filter(([, value]) => value)")
+    assert stated[0] == ["problem", "elasticity"] and len(stated) == 3
+    await tab.picture(folder / "given 400.png", width=400)
+    assert await tab.value("document.documentElement.scrollWidth") <= 400 and tab.complaints == []
+
+
 LEVEL = """(async () => (await (await fetch(
   document.querySelector('a[download="report.json"]').href)).json()).elasticity.levels[0])()"""
 
