@@ -76,7 +76,10 @@ def _without(kind: type[ProblemOptions], names: Sequence[str]) -> type[ProblemOp
 Mesh = Annotated[str, Parameter(help="path of a closed surface, or the name of a sample or a model.")]
 Volume = Annotated[
     Path,
-    Parameter(help="volume.npz as `iga-nn run` writes it, or a file of G+Smo (XML), MFEM, GeoPDEs or splinepy (JSON)."),
+    Parameter(
+        help="volume.npz as `iga-nn run` writes it, a file of G+Smo (XML), MFEM, GeoPDEs or splinepy (JSON), or a mesh "
+        "of hexahedra or tetrahedra (.msh, .inp, .vtu, .vtk, Exodus)."
+    ),
 ]
 VolumeOrRun = Annotated[
     Path, Parameter(help="volume.npz, another file with a volume, or the output folder of a run, with its solution.")

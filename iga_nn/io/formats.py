@@ -16,6 +16,9 @@ from ..errors import InputError, input_errors
 from ..type_check import check_type
 from .beginnings import kind_of
 from .kinds import FORMATS, read_body
+from .meshes import ENDINGS as MESHES
+from .meshes import find_mesh
+from .words import faults_of
 
 log = logging.getLogger(__name__)
 
@@ -26,7 +29,8 @@ NARROWEST = 1e-100  # knot span: with the largest control points, derivatives st
 def load_volume(path: str | Path, tolerance: float = TOLERANCE) -> BodyLike:
     """Return the volume of a volume.npz, G+Smo XML, MFEM NURBS mesh, GeoPDEs geometry file or splinepy JSON.
 
-    The kinds are recognized by their beginnings.
+    These kinds are recognized by their beginnings. Of a mesh of elements (see `load_mesh`) each hexahedron becomes a
+    patch, and each tetrahedron four, exactly.
 
     Parameters
     ----------
@@ -65,10 +69,7 @@ def load_volume(path: str | Path, tolerance: float = TOLERANCE) -> BodyLike:
     if source.is_dir():
         raise InputError(f"{source}: is a folder: name the volume.npz in it")
     with input_errors():
-        kind = kind_of(source) if source.is_file() else "npz"
-        if kind is None and source.suffix != ".npz":
-            raise InputError(f"{source}: is not a spline volume; create one with `iga-nn run poisson {source}`")
-        body = read_body(source, kind, tolerance) if kind in FORMATS else Body.load(source)
+        body = _read(source, tolerance)
     if near := body.nearly_glued:
         pairs = listed([f"{pair} ({distance:.2g} apart)" for pair, distance in near], SHOWN)
         log.warning("%s: faces that nearly match are not glued: %s; a larger tolerance glues them", path, pairs)
@@ -76,3 +77,18 @@ def load_volume(path: str | Path, tolerance: float = TOLERANCE) -> BodyLike:
     if min(float(np.diff(np.unique(row)).min()) for row in rows) < NARROWEST:
         raise InputError(f"{path}: has a knot span narrower than {NARROWEST:g}: derivatives there overflow; widen it")
     return body.simplest
+
+
+def _read(source: Path, tolerance: float) -> Body:
+    """Return the body of a file, also of a mesh of elements. Raises OSError and ValueError."""
+    kind = kind_of(source) if source.is_file() else "npz"
+    if kind in FORMATS:
+        return read_body(source, kind, tolerance)
+    if kind is None and source.suffix.lower() in MESHES and (mesh := find_mesh(source)) is not None:
+        from .mesh_body import body_of_mesh
+
+        with faults_of(source):
+            return body_of_mesh(mesh)
+    if kind is None and source.suffix != ".npz":
+        raise InputError(f"{source}: is not a spline volume; create one with `iga-nn run poisson {source}`")
+    return Body.load(source)
