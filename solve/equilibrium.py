@@ -246,7 +246,8 @@ class Equilibrium:
         """Return the loads at a share of them and what the supports answer."""
         matrix, loads = self.forces.matrix, share * self.loads
         faces = [
-            replace(face, values=share * face.values) if isinstance(face, WeakFace) else face for face in matrix.faces
+            replace(face, values=share * face.values, loads=share * face.loads) if isinstance(face, WeakFace) else face
+            for face in matrix.faces
         ]
         systems = systems_of(self.stated, Assembled(matrix, loads, share * self.known, self.problem.conditions))
         return balance(self.problem, systems, self.unknowns, faces, full, self.forces.apply(full))

@@ -115,6 +115,8 @@ def balance(
     processes, layout, total = unknowns.processes, products.layout, unknowns.processes.total
     added = Resultants(problem.form.components, _has_moments(problem, processes, faces))
     places = added.places(patches)
+    if problem.form.has_large_strains:  # forces act where the body has gone
+        places = [None if place is None else place + own for place, own in zip(places, coefficients, strict=True)]
     loads, full = layout.joined([patch.loads for patch in patches]), layout.joined(coefficients)
     residuals = products - loads
     fixed = unknowns.on_fixed(residuals)
@@ -130,8 +132,10 @@ def balance(
     for face in faces:
         here, on_face = [patches[place].problem for place in face.patches], full.of(face.patches)
         if isinstance(face, WeakFace):
-            own = own + _given(face, layout, places, added)
-            own = own - _add_regions(here[0], face, on_face, supports, added)
+            moved = face.values_of(on_face) if problem.form.has_large_strains else 0.0
+            at = np.asarray(face.x) + moved
+            own = own + _given(face, at, layout, places, added)
+            own = own - _add_regions(here[0], face, at, on_face, supports, added)
         elif isinstance(face, FaceRule):
             own = own - _add_robin_faces(here, face, on_face, supports)
     whole = total(own)
@@ -199,14 +203,16 @@ def _has_end(space: TrialSpace, name: str) -> bool:
     return bool(rows.stop == space.whole.shape[0] if name == "u1" else rows.start == 0)
 
 
-def _given(face: WeakFace, layout: CoefficientLayout, places: Sequence[Array | None], added: Resultants) -> Array:
+def _given(
+    face: WeakFace, at: Array, layout: CoefficientLayout, places: Sequence[Array | None], added: Resultants
+) -> Array:
     """Return the given fluxes of a face at its points, minus its part of the loads of coefficients.
 
     That part has the terms of given values, too, and its moments are those of the trial space.
     """
     on_patches = np.zeros((len(face.patches), face.form.components, *layout.shapes[face.patches[0]]))
     face.add_load(on_patches)
-    found = added.of(face.weights * face.loads, face.x)
+    found = added.of(face.weights * face.loads, at)
     for number, own in zip(face.patches, on_patches, strict=True):
         found = found - added.of(own, places[number])
     return found
@@ -236,11 +242,16 @@ def _add_robin_faces(
 
 
 def _add_regions(
-    problem: BoundaryValueProblem, face: WeakFace, coefficients: Array, found: dict[str, Array], added: Resultants
+    problem: BoundaryValueProblem,
+    face: WeakFace,
+    at: Array,
+    coefficients: Array,
+    found: dict[str, Array],
+    added: Resultants,
 ) -> Array:
     """Add the reactions of supports on regions, and return the flux of an exchange into a body of u = 0.
 
-    coefficients: (k, c, n_u, n_v, n_w), of the patches of the faces.
+    at: (3, m), where the forces act. coefficients: (k, c, n_u, n_v, n_w), of the patches of the faces.
     """
     outside, taken = added.none, np.zeros(len(face.weights), dtype=bool)
     pulls = face.pulls(coefficients) if any(one.is_essential for one in problem.conditions) else None
@@ -248,7 +259,7 @@ def _add_regions(
         here = face.holds(i)
         if condition.is_essential and condition.role in found and pulls is not None:
             chosen = np.flatnonzero(here & ~taken)
-            found[condition.role] += added.of(pulls[:, chosen], face.x[:, chosen])
+            found[condition.role] += added.of(pulls[:, chosen], at[:, chosen])
             taken |= here
         elif condition.factor is not None and here.any():
             chosen = np.flatnonzero(here)
@@ -257,6 +268,6 @@ def _add_regions(
             given = condition.flux_at(problem, x, face.normal[:, chosen])
             u = np.einsum("cdm,dm->cm", free, face.traces(coefficients)[0][:, chosen])
             pull = np.einsum("cdm,dm->cm", condition.factors_at(len(u), x, face.normal[:, chosen]), u)
-            found[condition.role] += added.of(weights * np.einsum("cdm,dm->cm", free, given - pull), x)
-            outside += added.of(weights * np.einsum("cdm,dm->cm", free, given), x)
+            found[condition.role] += added.of(weights * np.einsum("cdm,dm->cm", free, given - pull), at[:, chosen])
+            outside += added.of(weights * np.einsum("cdm,dm->cm", free, given), at[:, chosen])
     return outside

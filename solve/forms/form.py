@@ -36,6 +36,8 @@ class Form:
     constant : bool
         Whether the flux has neither u nor x in it, and there is no reaction: products are then faster, and `flux` may
         get None for x. False by default.
+    has_large_strains : bool
+        Whether forces act where the body has gone, so that moments are those of the moved body. False by default.
     history : int
         Number of internal variables at a point, which `x.state` (history, ...) has in `flux`, or None before the first
         load step; `advanced` returns those at the end of a step. 0 by default.
@@ -57,6 +59,7 @@ class Form:
     components: int = 1
     symmetric: bool = True
     linear: bool = True
+    has_large_strains: bool = False
     constant: bool = False
     history: int = 0
 

@@ -24,6 +24,8 @@ class Hyperelastic(NonlinearBody):
 
     bulk: Number = 1.0
 
+    has_large_strains = True
+
     def slopes(self, first: Any, second: Any) -> tuple[Any, Any]:
         """Return the derivatives of w by i1 and i2, at i1 - 3 and i2 - 3."""
         raise NotImplementedError(f"{type(self).__name__}.slopes")
