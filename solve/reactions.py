@@ -32,7 +32,7 @@ class Moments:
     """Hold the moments about the origin of the loads (3,), and of the reaction of each support (3,).
 
     They balance as the forces do, but for bodies whose maps are rational, or of a degree above that of the trial
-    space: there they balance to the accuracy of the solution.
+    space: there they balance to the accuracy of the solution. Under large strains forces act where the body has gone.
     """
 
     load: tuple[float, ...]
