@@ -20,7 +20,8 @@ from .stresses import outer_principal, principal, von_mises
 
 Number = float | Mapping[Owner, float]
 NONE = ("0", "0", "0")  # of a vector
-ON_REGIONS = ("fix", "roller", "symmetry", "load", "pressure", "spring")
+SUPPORTS = ("fix", "roller", "symmetry", "turn", "spring", "total_spring", "foundation")
+LOADS = ("load", "pressure", "hydrostatic", "total_force", "moment", "remote_force", "bearing")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -39,12 +40,20 @@ class NonlinearBody(LawWithData):
     load: GivenRegions | None = None
     pressure: GivenRegions | None = None
     spring: GivenRegions | None = None
+    turn: GivenRegions | None = None
+    total_spring: GivenRegions | None = None
+    foundation: GivenRegions | None = None
+    hydrostatic: GivenRegions | None = None
+    total_force: GivenRegions | None = None
+    moment: GivenRegions | None = None
+    remote_force: GivenRegions | None = None
+    bearing: GivenRegions | None = None
 
     exact: ClassVar[Data | None] = None  # type: ignore[misc]  # the exact solution is not a datum of these laws
     components = 3
     linear = False
     labels: ClassVar = {"source": "body_force"}
-    keywords: ClassVar = {name: OF_BODIES[name] for name in ON_REGIONS}
+    keywords: ClassVar = {name: OF_BODIES[name] for name in (*SUPPORTS, *LOADS)}
     numbers: ClassVar[tuple[str, ...]]  # the names of the material's numbers
 
     def __post_init__(self) -> None:
