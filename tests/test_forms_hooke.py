@@ -1,9 +1,14 @@
 """Tests the elastic law of one material: orthotropic stiffness, its axes, and its thermal stress."""
 
+from itertools import product
+
 import numpy as np
 import pytest
 
 import iga_nn
+from solve import benchmark_volume
+from solve.field import Points
+from solve.forms.axes import Tangents
 from solve.forms.hooke import Hooke
 from solve.forms.library import MATERIALS
 from solve.forms.stiffness import is_the_same_across, nearest_isotropic
@@ -61,3 +66,27 @@ def test_a_law_without_volume_keeps_the_thermal_stress():
     law = Hooke(1.0, 0.3, expansion=1e-3)
     assert np.array_equal(law.without_volume().hold, law.hold)
     assert np.allclose(law.hold, np.eye(3) * 1e-3 / 0.4)
+
+
+def test_axes_along_parameters_are_the_lines_of_the_map():
+    volume, rows = benchmark_volume(2), (np.array([0.3]), np.array([0.1, 0.7]), np.array([0.2, 0.5, 0.9]))
+    u, v, w = rows
+    tangents, grid = Tangents.of(volume, "v"), np.moveaxis(volume.grid(*rows), -1, 0)
+    plane = tangents.at(Points.of(np.ascontiguousarray(grid[:, 0].swapaxes(1, 2)), rows, (2, 1)))
+    for (i, one), (j, other) in product(enumerate(v), enumerate(w)):
+        place = np.array([[u[0], one, other]])
+        line = volume.jacobian(place)[0, :, 1]
+        assert np.allclose(plane[:, j, i], line)
+        assert np.allclose(tangents.at(Points.at(volume(place).T, place))[:, 0], line)
+
+
+def test_a_body_with_axes_along_the_map_is_that_with_the_same_vectors():
+    box = iga_nn.BSplineVolume.uniform(
+        [[[[2 * i + j, j, k] for k in (0, 1)] for j in (0, 1)] for i in (0, 1)], degree=1
+    )
+    law = {"fix": "u0", "load": {"u1": (0, 1, 1)}, **CARBON}
+    found = [
+        iga_nn.solve(box, iga_nn.Elasticity(first_axis=axis, **law), degree=2).field.coefficients
+        for axis in ("v", (1, 1, 0), ("1+0*x", "1", "0"))
+    ]
+    assert np.allclose(found[0], found[1], rtol=1e-6) and np.allclose(found[2], found[1], rtol=1e-6)

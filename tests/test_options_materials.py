@@ -1,10 +1,13 @@
 """Tests the options of materials: names, units, axes, and options that do nothing."""
 
+from pathlib import Path
+
 import pytest
 
 import iga_nn
 from iga_nn.options.analysis import ModesOptions
 from iga_nn.options.materials import listed
+from solve.forms.library import MATERIALS
 
 LOADED = {"fix": ("u0",), "load": ("u1=1;0;0",)}
 
@@ -86,3 +89,14 @@ def test_the_library_is_listed_with_its_sources():
     lines = listed().splitlines()
     assert lines[2].split() == ["steel", "210000", "0.3", "7.85e-09", "1.2e-05", "0.0533", "235"]
     assert "S235" in lines[-17]
+
+
+def test_the_page_has_the_numbers_of_the_library():
+    page = (Path(__file__).parents[1] / "docs" / "materials.md").read_text(encoding="utf-8")
+    for one in MATERIALS:
+        assert f"| `{one.name}` | {_shown(one.young)} | {_shown(one.poisson_ratio)} |" in page
+        assert f"| {', '.join(one.other_names) or '–'} | {one.source} |" in page
+
+
+def _shown(value):
+    return "; ".join(f"{part:.5g}" for part in value) if isinstance(value, tuple) else f"{value:.5g}"

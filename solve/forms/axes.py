@@ -49,14 +49,13 @@ class Tangents(FieldOnBody):
         """Return the tangents (3, ...) at points x (3, ...) of one patch, whose parameters are known."""
         assert isinstance(x, Points)
         if x.places is not None:
-            where = x.places
-        else:
-            assert x.rows is not None
-            order = (*x.order, *(axis for axis in range(3) if axis not in x.order))
-            grid = np.meshgrid(*(np.asarray(x.rows[axis], dtype=np.float64) for axis in order), indexing="ij")
-            where = np.stack([grid[order.index(axis)].ravel() for axis in range(3)], axis=1)
-        tangents = self.volumes[0].jacobian(where)[:, :, self.axis]
-        return np.ascontiguousarray(tangents.T).reshape(3, *x.shape[1:])
+            return np.ascontiguousarray(self.volumes[0].jacobian(x.places)[:, :, self.axis].T)
+        assert x.rows is not None
+        order = tuple(int(axis == self.axis) for axis in range(3))
+        tangents = np.moveaxis(self.volumes[0].grid(*x.rows, derivative=order), -1, 0)
+        single = (axis for axis in range(3) if axis not in x.order)  # directions of one parameter
+        turned = tangents.transpose(0, *(1 + axis for axis in (*x.order, *single)))
+        return np.ascontiguousarray(turned).reshape(3, *x.shape[1:])
 
 
 def along(axes: Any, tensor: Any) -> Any:
