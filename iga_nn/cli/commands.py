@@ -355,7 +355,8 @@ def export_volume(
 
     Args:
         to: gismo (G+Smo XML), mfem (NURBS mesh), vtk (exact Bezier cells), view (samples for slicing in ParaView),
-            json (splinepy's), calculix (Abaqus' and CalculiX' input file, with the problem of the run).
+            json (splinepy's), calculix (Abaqus' and CalculiX' input file, with the problem of the run),
+            gmsh (curved hexahedra), step or iges (spline faces of the boundary).
         out: file to write; the volume's stem with the format's ending in the current folder by default.
         solution: solution.npz to export, too: as point data u (vtk, view), or in a file beside it (NAME_u.xml, NAME.gf,
             NAME_u.json).
@@ -363,7 +364,7 @@ def export_volume(
             would have more than a million cells.
         quantity: quantities in a view of a solution, beside u, such as stress, von_mises, principal, strain, gradient,
             flux.
-        element: of calculix C3D20 (default), C3D20R or C3D8.
+        element: of calculix C3D20 (default), C3D20R or C3D8; of gmsh hex64 (default) or hex27.
         force: replace an existing file.
     """
     from ..io.export import export

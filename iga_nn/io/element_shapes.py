@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from math import comb
 
 import numpy as np
 
@@ -62,7 +63,55 @@ def _with_edges() -> IntArray:
     return np.concatenate([corners, [(corners[a] + corners[b]) // 2 for a, b in EDGES]])
 
 
+@dataclass(frozen=True, eq=False)
+class Full(Shape):
+    """Hold an element with all nodes of its lattice: the map of degree q through them."""
+
+    def functions(self, local: Array) -> Array:
+        """Return the functions (m, k) of the nodes at coordinates (m, 3) from -1 to 1; they sum to 1."""
+        t = np.linspace(-1.0, 1.0, self.degree + 1)
+        rows = [
+            np.prod([(local - other) / (own - other) for other in t if other != own], axis=0) for own in t
+        ]  # of each place of a direction: (m, 3)
+        along = np.stack(rows)  # (q + 1, m, 3)
+        return np.asarray(np.prod([along[self.nodes[:, axis], :, axis] for axis in range(3)], axis=0).T)
+
+    @cached_property
+    def to_bernstein(self) -> Array:
+        """Return the matrix ((q + 1)^3, k) from values at the nodes to Bernstein coefficients of degree q."""
+        q, t = self.degree, np.linspace(0.0, 1.0, self.degree + 1)
+        values = np.stack([comb(q, k) * t**k * (1.0 - t) ** (q - k) for k in range(q + 1)], axis=1)
+        one = np.linalg.inv(values)
+        whole = np.einsum("ai,bj,ck->abcijk", one, one, one).reshape((q + 1) ** 3, *[q + 1] * 3)
+        i, j, k = self.nodes.T
+        return np.asarray(whole[:, i, j, k])
+
+
+def _of_gmsh(degree: int) -> IntArray:
+    """Return the places (k, 3) of the nodes of gmsh's hexahedra: corners, edges, faces, and the inside.
+
+    Gmsh reference manual, "Node ordering"; what is inside of a face or of the element is ordered as a smaller one.
+    """
+    corners = np.array(CORNERS)
+    found = [degree * corners]
+    steps = np.arange(1, degree)[:, None]
+    found += [degree * corners[a] + steps * (corners[b] - corners[a]) for a, b in GMSH_EDGES]
+    if degree == 2:
+        found += [corners[list(face)].sum(axis=0)[None] // 2 for face in GMSH_FACES]
+        return np.concatenate([*found, np.ones((1, 3), dtype=np.int64)])
+    for face in GMSH_FACES:
+        own = corners[list(face)]
+        found.append(degree * own + np.where(np.ptp(own, axis=0) > 0, 1 - 2 * own, 0))  # a step along the face
+    return np.concatenate([*found, 1 + corners])
+
+
+GMSH_EDGES = ((0, 1), (0, 3), (0, 4), (1, 2), (1, 5), (2, 3), (2, 6), (3, 7), (4, 5), (4, 7), (5, 6), (6, 7))
+GMSH_FACES = ((0, 3, 2, 1), (0, 1, 5, 4), (0, 4, 7, 3), (1, 2, 6, 5), (2, 3, 7, 6), (4, 5, 6, 7))
+
 C3D8 = Shape("C3D8", 1, np.array(CORNERS))
 C3D20 = Shape("C3D20", 2, _with_edges())
 C3D20R = Shape("C3D20R", 2, _with_edges())
 SHAPES = {shape.name: shape for shape in (C3D20, C3D20R, C3D8)}
+HEX27 = Full("hex27", 2, _of_gmsh(2))
+HEX64 = Full("hex64", 3, _of_gmsh(3))
+GMSH_SHAPES = {shape.name: shape for shape in (HEX64, HEX27)}

@@ -39,7 +39,7 @@ def export(
     volume : str or Path
         File with the volume, or the output folder of a run: then its solution is exported, too.
     to : str
-        "gismo", "mfem", "vtk", "view", "json", "calculix".
+        "gismo", "mfem", "vtk", "view", "json", "calculix", "gmsh", "step" or "iges".
     out : str or Path, optional
         By default the stem of the volume, or the name of the folder, with the format's ending, in the current folder.
     solution : str or Path, optional
@@ -75,6 +75,8 @@ def export(
     chosen = _format(to, {"samples": samples is not None, "quantity": bool(quantity), "element": element is not None})
     if samples is not None and samples < 1:
         raise InputError(f"samples {samples}: must be 1 or larger")
+    if solution is not None and not chosen.holds_solution:
+        raise InputError(f"format {to!r}: has no place for a solution: leave --solution out")
     source, beside = _run(Path(volume))
     given = beside if solution is None and chosen.holds_solution else None if solution is None else Path(solution)
     stem = Path(volume).resolve().name if Path(volume).is_dir() else source.stem

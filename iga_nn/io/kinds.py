@@ -12,7 +12,7 @@ from parameterize.surface.part import PartSurface
 from solve.field import FieldOnBody
 from solve.forms.boundary_value_problem import BoundaryValueProblem
 
-from . import calculix, geopdes, gismo, mfem, mfem_writer, splinepy, view, vtk
+from . import boundary_faces, calculix, geopdes, gismo, gmsh, mfem, mfem_writer, splinepy, view, vtk
 from .patches_of_files import body_of
 from .words import faults_of, text_of
 
@@ -63,6 +63,11 @@ def _calculix(path: Path, given: Exported) -> None:
     )
 
 
+def _gmsh(path: Path, given: Exported) -> None:
+    more = {"parts": given.samples or 1, "element": given.element or "hex64"}
+    gmsh.write_gmsh(path, given.body, given.solution, given.problem, given.part, **more)  # type: ignore[arg-type]
+
+
 FORMATS = {
     "gismo": Format(
         ".xml",
@@ -86,6 +91,9 @@ FORMATS = {
         splinepy.read_json,
     ),
     "calculix": Format(".inp", _calculix, takes=("samples", "element")),
+    "gmsh": Format(".msh", _gmsh, takes=("samples", "element")),
+    "step": Format(".step", lambda path, given: boundary_faces.write_step(path, given.body), holds_solution=False),
+    "iges": Format(".igs", lambda path, given: boundary_faces.write_iges(path, given.body), holds_solution=False),
 }
 
 
