@@ -11,7 +11,7 @@ import numpy as np
 
 from parameterize.arrays import Array
 from parameterize.spline.body import BodyLike, as_body
-from parameterize.spline.volume import BSplineVolume
+from parameterize.spline.volume import UNITS, BSplineVolume
 
 from ..field import FieldOnBody, Points
 from .data import Datum, demand
@@ -51,8 +51,8 @@ class Tangents(FieldOnBody):
         if x.places is not None:
             return np.ascontiguousarray(self.volumes[0].jacobian(x.places)[:, :, self.axis].T)
         assert x.rows is not None
-        order = tuple(int(axis == self.axis) for axis in range(3))
-        tangents = np.moveaxis(self.volumes[0].grid(*x.rows, derivative=order), -1, 0)
+        u, v, w = x.rows
+        tangents = np.moveaxis(self.volumes[0].grid(u, v, w, UNITS[self.axis]), -1, 0)
         single = (axis for axis in range(3) if axis not in x.order)  # directions of one parameter
         turned = tangents.transpose(0, *(1 + axis for axis in (*x.order, *single)))
         return np.ascontiguousarray(turned).reshape(3, *x.shape[1:])
