@@ -9,7 +9,7 @@ import pytest
 from known_meshes import KNOWN, grid, hexahedron
 
 from parameterize.meshes.certify import certify_mesh
-from parameterize.meshes.determinant import exact_determinant, point_at
+from parameterize.meshes.evaluation import exact_determinant, point_at
 from parameterize.meshes.mesh import VolumeMesh
 from parameterize.meshes.search import FOLDED, INVERTED
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from parameterize.meshes.determinant import ElementForm, exact_determinant, reference_corners
+from parameterize.meshes.determinant import ElementForm, reference_corners
+from parameterize.meshes.evaluation import exact_determinant
 from parameterize.meshes.kinds import SERENDIPITY, hexahedron, tetra
 
 KINDS = [hexahedron(1), SERENDIPITY, hexahedron(2), hexahedron(2, 1, 3), tetra(1), tetra(2), tetra(3)]

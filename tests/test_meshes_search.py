@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from parameterize.meshes.determinant import exact_determinant
+from parameterize.meshes.evaluation import exact_determinant
 from parameterize.meshes.kinds import SERENDIPITY, hexahedron, tetra
 from parameterize.meshes.search import FLAT, FOLDED, INVERTED, POSITIVE, certify_elements
 

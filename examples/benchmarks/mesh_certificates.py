@@ -28,7 +28,7 @@ HEAD = ("elements", "number", "nodes", "read", "det J", "overlap", "verdict", "o
 
 
 def grid(kind: ElementKind, count: int) -> iga_nn.VolumeMesh:
-    """Return about so many elements: a twisted cube of cubes, each cut into six tetrahedra where these are asked for."""
+    """Return about so many elements: a twisted cube of cubes, each cut into six for tetrahedra."""
     per_cube = 1 if kind.shape == "hexahedron" else 6
     n = max(1, round((count / per_cube) ** (1 / 3)))
     p = kind.degrees[0]

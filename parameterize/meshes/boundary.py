@@ -217,19 +217,27 @@ def _bernstein(degree: int, where: Array) -> Array:
     return np.asarray(binomials(degree) * where[:, None] ** powers * (1.0 - where[:, None]) ** (degree - powers))
 
 
-def shells_of(corners: IntArray) -> tuple[IntArray, IntArray, Mask]:
-    """Return the shell of each face, the edges of each (f, 4), -1 for none, and which edges more than two faces have.
+def edges_of(corners: IntArray) -> tuple[IntArray, IntArray, IntArray]:
+    """Return the ends (e, 2) of the edges of faces (f, 4), how many faces each has, and the edges (f, 4) of each face.
 
-    corners: (f, 4) of the boundary's faces, those of triangles with -1 behind. Faces with a common edge are in a shell.
+    corners: those of triangles have -1 behind, and their fourth edge is -1. Ends are ascending.
     """
     last = np.where(corners[:, 3] < 0, corners[:, 0], corners[:, 3])
     ahead = np.column_stack([corners[:, 1:3], last, corners[:, 0]])
     real = np.column_stack([np.ones((len(corners), 3), dtype=bool), corners[:, 3] >= 0])
     pairs = np.sort(np.stack([corners, ahead], axis=2), axis=2)[real]
-    keys, numbers, counts = np.unique(pairs, axis=0, return_inverse=True, return_counts=True)
+    ends, numbers, counts = np.unique(pairs, axis=0, return_inverse=True, return_counts=True)
     edges: IntArray = np.full((len(corners), 4), -1)
     edges[real] = numbers.ravel()
-    rows = np.nonzero(real)[0]
-    links = np.stack([rows, len(corners) + numbers.ravel()])
-    shells = numbers_of_classes(len(corners) + len(keys), links)[: len(corners)]
-    return shells, edges, counts != 2
+    return ends, counts, edges
+
+
+def shells_of(edges: IntArray, is_plain: Mask, links: IntArray) -> IntArray:
+    """Return the number (f,) of the shell of each face: faces with a common plain edge, and linked ones, are in one.
+
+    edges: (f, 4) of each face, -1 for none. is_plain: (e,) whether two faces have an edge. links: (k, 2) of faces.
+    """
+    rows, places = np.nonzero((edges >= 0) & is_plain[edges])
+    pairs = np.stack([rows, len(edges) + edges[rows, places]])
+    joined = np.concatenate([pairs, links.reshape(-1, 2).T], axis=1)
+    return numbers_of_classes(len(edges) + len(is_plain), joined)[: len(edges)]

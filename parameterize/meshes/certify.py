@@ -7,7 +7,7 @@ from typing import Any, Literal
 import numpy as np
 
 from ..arrays import Array, IntArray, in_brackets, listed
-from .determinant import point_at
+from .evaluation import point_at
 from .mesh import VolumeMesh
 from .overlap import OverlapCheck, check_overlap
 from .search import FLAT, FOLDED, INVERTED, POSITIVE, UNDECIDED, WORDS, ElementsCertificate, certify_elements
@@ -225,7 +225,8 @@ def certify_mesh(mesh: VolumeMesh, *, max_depth: int = 10) -> MeshCertificate:
         for block, own in zip(mesh.blocks, nodes, strict=True)
     )
     if all(block.is_proved for block in blocks):
-        return MeshCertificate(mesh, blocks, check_overlap(mesh, sign))
+        scaled = min(float(block.scaled.min()) for block in blocks)
+        return MeshCertificate(mesh, blocks, check_overlap(mesh, sign, scaled))
     unknown = OverlapCheck(None, "it is looked for where det J is proved on all elements")
     return MeshCertificate(mesh, blocks, unknown)
 

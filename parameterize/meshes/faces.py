@@ -167,3 +167,35 @@ def _paired(rows: IntArray) -> tuple[IntArray, IntArray, IntArray, IntArray]:
     for rest in (crowded, one_sided, unlike):
         others[rest] = -2
     return others, one_sided, crowded, unlike
+
+
+def unlike_edge(mesh: VolumeMesh, faces: Faces, labels: IntArray, outer: IntArray) -> int | None:
+    """Return the row of a face of the boundary with an edge whose corner nodes, but not others, another edge has."""
+    keys, nodes, owners = [], [], []
+    widest = max(max(block.kind.degrees) for block in mesh.blocks) - 1
+    if not widest:
+        return None
+    for number, (block, start) in enumerate(zip(mesh.blocks, mesh.starts, strict=True)):
+        for face, found in enumerate(face_kinds(block.kind)):
+            rows = outer[(faces.blocks[outer] == number) & (faces.faces[outer] == face)]
+            own = labels[block.nodes[faces.elements[rows] - start]]
+            count = len(found.loop)
+            for k in range(count):
+                ahead = (k + 1) % count
+                others = [c for c in range(count) if c not in (k, ahead)]
+                on_edge = (found.places[:, others] < 1e-9).all(axis=1) & (found.places[:, [k, ahead]] > 1e-9).all(
+                    axis=1
+                )
+                inner = found.nodes[on_edge][np.argsort(found.places[on_edge, ahead])]
+                ends = own[:, found.loop[[k, ahead]]]
+                row = np.full((len(rows), widest), -1)
+                along = own[:, inner]
+                row[:, : len(inner)] = np.where((ends[:, :1] < ends[:, 1:]), along, along[:, ::-1])
+                keys.append(np.sort(ends, axis=1))
+                nodes.append(row)
+                owners.append(rows)
+    table = np.column_stack([np.concatenate(keys), np.concatenate(nodes)])
+    order = np.lexsort(table.T[::-1])
+    same_ends = (table[order][1:, :2] == table[order][:-1, :2]).all(axis=1)
+    unlike = same_ends & (table[order][1:, 2:] != table[order][:-1, 2:]).any(axis=1)
+    return int(np.concatenate(owners)[order[1:][unlike][0]]) if unlike.any() else None

@@ -1,4 +1,4 @@
-"""Whether a node lies inside of elements: those whose control points' box holds it are searched as Bezier patches."""
+"""Whether a point lies inside of elements: those whose control points' box holds it are searched as Bezier patches."""
 
 import numpy as np
 
@@ -11,12 +11,11 @@ from .mesh import VolumeMesh
 from .patches import patch_matrices
 
 
-def is_inside(mesh: VolumeMesh, local: Array, among: Mask, node: int) -> int | None:
-    """Return the row of an element among some (elements,) that holds a node, None where none does.
+def is_inside(mesh: VolumeMesh, local: Array, among: Mask, point: Array) -> int | None:
+    """Return the row of an element among some (elements,) that holds a point (3,), None where none does.
 
-    local: (n, 3), the points, scaled to magnitude 1 near the origin.
+    local: (n, 3), the points of the mesh, scaled to magnitude 1 near the origin, as `point` is.
     """
-    point = local[node]
     for block, start in zip(mesh.blocks, mesh.starts, strict=True):
         rows = np.flatnonzero(among[start : start + len(block.nodes)])
         near = rows[_may_hold(block.kind, local[block.nodes[rows]], point)]

@@ -13,12 +13,15 @@ from scipy.spatial import cKDTree
 from ..arrays import Array, IntArray, in_brackets
 from ..certificate.boundary import settle
 from ..spline.body import numbers_of_classes
-from .boundary import DEPTH, Quadrilaterals, QuadrilateralSurface, quadrilaterals, shells_of
-from .faces import Faces, face_kinds, faces_of
+from .boundary import DEPTH, Quadrilaterals, QuadrilateralSurface, edges_of, quadrilaterals, shells_of
+from .edges import around
+from .faces import Faces, faces_of, unlike_edge
 from .inside import is_inside
 from .mesh import VolumeMesh
 
 _NEAR = 1e-10  # of the size: nodes so near to each other may be in one place, up to the decimals of a file
+_SHORT = 1e-6  # of the shortest edge: nodes farther from each other are not in one place
+_PLUMP = 1e-4  # scaled Jacobian
 _FLAT = 1e-9  # of the sum of their magnitudes: more than the terms of a shell's volume can be off
 
 
@@ -48,24 +51,34 @@ class OverlapCheck:
     touching: int = 0
 
 
-def check_overlap(mesh: VolumeMesh, sign: int) -> OverlapCheck:
-    """Decide whether elements, all of them with sign * det J > 0, overlap."""
+def check_overlap(mesh: VolumeMesh, sign: int, scaled: float = 0.0) -> OverlapCheck:
+    """Decide whether elements, all of them with sign * det J > 0, overlap.
+
+    scaled: a lower bound of their scaled Jacobian. Where it is not tiny, elements on the same side of faces that are
+    one up to rounding are known to overlap.
+    """
+    if len({block.kind.is_bezier for block in mesh.blocks if max(block.kind.degrees) > 1}) > 1:
+        return OverlapCheck(None, "Bezier and Lagrange elements are mixed, whose faces are not compared")
     labels = same_places(mesh.points)
     faces = faces_of(mesh, labels)
-    near = _nearly_same(mesh.points, labels, faces)
+    near = _nearly_same(mesh, labels, faces) if scaled > _PLUMP else None
     if near is not None and (found := _same_side(mesh, faces_of(mesh, near))):
         return found
     return replace(_checked(mesh, sign, labels, faces), touching=_touching(mesh, faces, labels))
 
 
-def _nearly_same(points: Array, labels: IntArray, faces: Faces) -> IntArray | None:
+def _nearly_same(mesh: VolumeMesh, labels: IntArray, faces: Faces) -> IntArray | None:
     """Return labels (n,) that are equal for points of the boundary up to rounding in one place; None without such."""
+    points = mesh.points
     corners = np.unique(faces.corners[faces.others < 0])
     corners = corners[corners >= 0]
     if not len(corners):
         return None
     size = float(np.ptp(points[corners], axis=0).max())
-    pairs = cKDTree(points[corners]).query_pairs(_NEAR * size, output_type="ndarray")
+    ends = np.sort(np.stack([faces.corners[:, :2], faces.corners[:, 1:3]]).reshape(-1, 2), axis=1)
+    shortest = float(np.linalg.norm(points[ends[:, 1]] - points[ends[:, 0]], axis=1).min())
+    reach = min(_NEAR * size, _SHORT * shortest)
+    pairs = cKDTree(points[corners]).query_pairs(reach, output_type="ndarray")
     if not len(pairs):
         return None
     classes = numbers_of_classes(len(corners), pairs.T)
@@ -114,11 +127,11 @@ def _checked(mesh: VolumeMesh, sign: int, labels: IntArray, faces: Faces) -> Ove
         count = "1 face" if len(faces.unlike) == 1 else f"{len(faces.unlike)} faces"
         reason = f"{count} of elements have the corner nodes of another one, but other nodes: the mesh does not conform"
         return OverlapCheck(None, reason, *_at(mesh, faces, int(faces.unlike[0])))
-    local, back = _local(mesh.points)
+    local, back = _local(mesh)
     outer = np.flatnonzero(faces.on_boundary)
     if not len(outer):
         return OverlapCheck(None, "every face has two elements, so that the mesh has no boundary")
-    if (row := _unlike_edge(mesh, faces, labels, outer)) is not None:
+    if (row := unlike_edge(mesh, faces, labels, outer)) is not None:
         reason = "edges of elements have the same corner nodes, but other nodes: the mesh does not conform"
         return OverlapCheck(None, reason, *_at(mesh, faces, row))
     pieces = quadrilaterals(mesh, faces, labels, local)
@@ -157,11 +170,20 @@ def _of_shells(
     mesh: VolumeMesh, sign: int, faces: Faces, outer: IntArray, found: Quadrilaterals, local: Array
 ) -> OverlapCheck:
     """Return whether shells, the connected parts of a boundary that does not meet itself, enclose a place twice."""
-    shells, edges, crowded = shells_of(faces.corners[outer])
-    if crowded.any():
-        row = int(outer[np.flatnonzero(crowded[edges].any(axis=1))[0]])
-        reason = "elements touch along an edge alone, and what lies around it is not proved"
-        return OverlapCheck(None, reason, *_at(mesh, faces, row))
+    ends, counts, edges = edges_of(faces.corners[outer])
+    links = np.empty((0, 2), dtype=np.int64)
+    if np.any(counts != 2):
+        found_around = around(mesh, faces, ends[counts != 2])
+        if not found_around.apart:
+            words = (
+                "overlap around an edge that they touch in" if found_around.apart is False else "touch along an edge"
+            )
+            reason = (
+                f"elements {words}{'' if found_around.apart is False else ', and what lies around it is not proved'}"
+            )
+            return OverlapCheck(found_around.apart is False or None, reason, *_at(mesh, faces, found_around.row))
+        links = np.searchsorted(outer, found_around.links)
+    shells = np.unique(shells_of(edges, counts == 2, links), return_inverse=True)[1]
     glued = np.flatnonzero(faces.others >= 0)
     parts = numbers_of_classes(len(mesh), faces.elements[np.stack([glued, faces.others[glued]])])
     flux = np.zeros(len(faces.others))
@@ -180,32 +202,30 @@ def _of_shells(
         reason = f"the elements connected to element {number} wind more than once around a place"
         return OverlapCheck(True, reason, (number,))
     for shell in outward.tolist() if parts.max() > 0 else ():
-        found_inside = _inside(mesh, faces, local, parts, outer[shells == shell])
+        found_inside = _inside(mesh, faces, local, parts, found, outer[shells == shell])
         if found_inside is not None:
             return found_inside
     return OverlapCheck(False)
 
 
-def _inside(mesh: VolumeMesh, faces: Faces, local: Array, parts: IntArray, rows: IntArray) -> OverlapCheck | None:
+def _inside(
+    mesh: VolumeMesh, faces: Faces, local: Array, parts: IntArray, pieces: Quadrilaterals, rows: IntArray
+) -> OverlapCheck | None:
     """Return that the part whose outward shell has faces (k,) lies inside of another one; None where it does not.
 
-    Boundaries do not cross, so that all nodes are inside, or none; those that other parts have, too, tell nothing.
+    Boundaries do not cross, so that all middles of faces are inside, or none.
     """
-    part = parts[faces.elements[rows[0]]]
-    own = np.unique(faces.corners[rows])
-    own = np.setdiff1d(own[own >= 0], faces.corners[parts[faces.elements] != part])
-    if not len(own):
-        return OverlapCheck(
-            None, "all nodes of a part of the mesh are those of others, too", *_at(mesh, faces, rows[0])
-        )
-    ends = np.concatenate([local[own].argmin(axis=0), local[own].argmax(axis=0)])
-    for node in own[np.unique(ends)].tolist():
-        inside = is_inside(mesh, local, parts != part, node)
+    number = faces.elements[rows[0]]
+    own = np.flatnonzero(np.isin(pieces.faces, rows))
+    middles = QuadrilateralSurface(pieces).points(own, np.full((len(own), 3), 0.5))
+    ends = np.concatenate([middles.argmin(axis=0), middles.argmax(axis=0)])
+    for point in middles[np.unique(ends)]:
+        inside = is_inside(mesh, local, parts != parts[number], point)
         if inside is None:
             return None
-    numbers = (int(mesh.numbers[faces.elements[rows[0]]]), int(mesh.numbers[inside]))
+    numbers = (int(mesh.numbers[number]), int(mesh.numbers[inside]))
     reason = f"the part of the mesh with element {numbers[0]} lies inside of that with element {numbers[1]}"
-    return OverlapCheck(True, reason, numbers, _triple(mesh.points[node]))
+    return OverlapCheck(True, reason, numbers, _middle(mesh, faces, int(rows[0])))
 
 
 def _fluxes(nets: Array) -> Array:
@@ -226,44 +246,15 @@ def _fluxes(nets: Array) -> Array:
     return total
 
 
-def _unlike_edge(mesh: VolumeMesh, faces: Faces, labels: IntArray, outer: IntArray) -> int | None:
-    """Return the row of a face of the boundary with an edge whose corner nodes, but not others, another edge has."""
-    keys, nodes, owners = [], [], []
-    widest = max(max(block.kind.degrees) for block in mesh.blocks) - 1
-    if not widest:
-        return None
-    for number, (block, start) in enumerate(zip(mesh.blocks, mesh.starts, strict=True)):
-        for face, found in enumerate(face_kinds(block.kind)):
-            rows = outer[(faces.blocks[outer] == number) & (faces.faces[outer] == face)]
-            own = labels[block.nodes[faces.elements[rows] - start]]
-            count = len(found.loop)
-            for k in range(count):
-                ahead = (k + 1) % count
-                others = [c for c in range(count) if c not in (k, ahead)]
-                on_edge = (found.places[:, others] < 1e-9).all(axis=1) & (found.places[:, [k, ahead]] > 1e-9).all(
-                    axis=1
-                )
-                inner = found.nodes[on_edge][np.argsort(found.places[on_edge, ahead])]
-                ends = own[:, found.loop[[k, ahead]]]
-                row = np.full((len(rows), widest), -1)
-                along = own[:, inner]
-                row[:, : len(inner)] = np.where((ends[:, :1] < ends[:, 1:]), along, along[:, ::-1])
-                keys.append(np.sort(ends, axis=1))
-                nodes.append(row)
-                owners.append(rows)
-    table = np.column_stack([np.concatenate(keys), np.concatenate(nodes)])
-    order = np.lexsort(table.T[::-1])
-    same_ends = (table[order][1:, :2] == table[order][:-1, :2]).all(axis=1)
-    unlike = same_ends & (table[order][1:, 2:] != table[order][:-1, 2:]).any(axis=1)
-    return int(np.concatenate(owners)[order[1:][unlike][0]]) if unlike.any() else None
-
-
-def _local(points: Array) -> tuple[Array, Callable[[Array], tuple[float, float, float]]]:
+def _local(mesh: VolumeMesh) -> tuple[Array, Callable[[Array], tuple[float, float, float]]]:
     """Return points moved to the origin and scaled by a power of two to magnitude 1, and the way back for one."""
-    middle = (points.min(axis=0) + points.max(axis=0)) / 2.0
-    moved = points - middle
-    exponent = int(np.frexp(np.abs(moved).max())[1])
-    return np.ldexp(moved, -exponent), lambda point: _triple(np.ldexp(point, exponent) + middle)
+    used = np.unique(np.concatenate([block.nodes.ravel() for block in mesh.blocks]))
+    own = mesh.points[used]
+    middle = (own.min(axis=0) + own.max(axis=0)) / 2.0
+    exponent = int(np.frexp(np.abs(own - middle).max())[1])
+    local = np.zeros_like(mesh.points)
+    local[used] = np.ldexp(own - middle, -exponent)
+    return local, lambda point: _triple(np.ldexp(point, exponent) + middle)
 
 
 def _at(mesh: VolumeMesh, faces: Faces, row: int) -> tuple[tuple[int, ...], tuple[float, float, float]]:

@@ -5,7 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..arrays import Array, IntArray, Mask
-from .determinant import Coefficients, ElementForm, exact_determinant, reference_corners
+from .determinant import Coefficients, ElementForm, reference_corners
+from .evaluation import exact_determinant
 from .kinds import ElementKind
 
 POSITIVE, INVERTED, FOLDED, FLAT, UNDECIDED = range(5)  # verdicts on an element

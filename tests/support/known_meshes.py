@@ -127,6 +127,23 @@ def corner_pair(shared: int) -> VolumeMesh:
     return VolumeMesh(cubes.points, (Block(HEX8, rows[[0, 7 if shared == 1 else 6]], np.array([1, 2])),))
 
 
+def chequered() -> VolumeMesh:
+    """Every second cube of a grid: they touch along edges."""
+    mesh = grid(HEX8, (3, 3, 3))
+    rows = mesh.blocks[0].nodes[::2]
+    return VolumeMesh(mesh.points, (Block(HEX8, rows, 1 + np.arange(len(rows))),))
+
+
+def fanned() -> VolumeMesh:
+    """A cube, and another element in its inside but for an edge that they have in common."""
+    square = grid(HEX8, (1, 1, 1)).points
+    at_edge = (square[:, :2] == 0).all(axis=1)
+    inner = square @ np.array([[0.3, 0.1, 0], [0.1, 0.3, 0], [0, 0, 0.5]]) + [0, 0, 0.25]
+    first = [int(np.flatnonzero((square == x).all(axis=1))[0]) for x in HEX8.lattice]
+    second = [k if at_edge[k] else 8 + k for k in first]
+    return VolumeMesh(np.concatenate([square, inner]), (Block(HEX8, np.array([first, second]), np.array([1, 2])),))
+
+
 def back_over() -> VolumeMesh:
     """Two cubes with a face in common, the second folded back into the first, both right-handed."""
     points = grid(HEX8, (1, 1, 1)).points
@@ -214,7 +231,9 @@ KNOWN: dict[str, Known] = {
     ),
     "face of tetra20 pushed in": Known(lambda: one(TET20, [((1, 1, 0), (1 / 3, 1 / 3, 0.5))]), "folded"),
     "cubes touching at a node": Known(lambda: corner_pair(1), "certified", False),
-    "cubes touching at an edge": Known(lambda: corner_pair(2), "certified", None, reason="edge"),
+    "cubes touching at an edge": Known(lambda: corner_pair(2), "certified", False),
+    "a wedge of elements across another, at an edge": Known(fanned, "certified", True, reason="edge"),
+    "voxels in a chequerboard": Known(chequered, "certified", False),
     "cubes touching, not glued": Known(
         lambda: together(_box((0, 0, 0), (1, 1, 1), (2, 2, 2)), _box((1, 0, 0), (2, 1, 1), (2, 2, 2))),
         "certified",
