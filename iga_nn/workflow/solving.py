@@ -314,6 +314,8 @@ def scene_of(
     with state.timed("report"), state.drawing("interactive view"):
         from ..report import viewer
 
+        if units == NO_UNITS:  # of a map alone
+            units = Units(length=state.report.get("input", {}).get("unit"))
         return viewer.scene_of(body, solution, problem, units=units)
     return None
 

@@ -97,7 +97,8 @@ function showLegend(scene, field, range) {
       put(item, "chip").style.background = color;
       item.append(label);
     });
-    if (scene.smooth) put(place, "title", `${scene.blocks.toLocaleString("en")} blocks; each colour is a face between sharp edges, of ${scene.smooth}`);
+    const faces = scene.smooth > 1 ? `${scene.smooth} faces between sharp edges, each in its colour` : "no sharp edges";
+    if (scene.smooth) put(place, "title", `${scene.blocks.toLocaleString("en")} blocks; ${faces}`);
     return;
   }
   put(place, "title", field.title);
