@@ -44,7 +44,7 @@ class Checkpoints:
     """
 
     def __init__(self, folder: Path | None, identity: Mapping[str, Any], *, resume: bool) -> None:
-        self._folder, self._resume, self._suffix = folder, resume, ""
+        self._folder, self._resume, self._suffix, self._options = folder, resume, "", ""
         self._identity = json.dumps(identity, sort_keys=True)
         if folder is not None and not resume:
             for path in [path for name in KEPT for path in folder.glob(f"{name}*.safetensors")]:
@@ -59,6 +59,12 @@ class Checkpoints:
         """Return the checkpoints of another part of the run, in files of their own."""
         other = copy(self)
         other._suffix += f"-{name}"
+        return other
+
+    def with_options(self, options: Mapping[str, Any]) -> "Checkpoints":
+        """Return the checkpoints of a stage with options of its own: those with others are passed over, not refused."""
+        other = copy(self)
+        other._options = json.dumps(options, sort_keys=True)
         return other
 
     def check(self) -> None:
@@ -87,12 +93,13 @@ class Checkpoints:
             return
         self._folder.mkdir(parents=True, exist_ok=True)
         header = {"format": str(FORMAT), "identity": self._identity, "state": json.dumps(state)}
+        header |= {"options": self._options} if self._options else {}
         copies = {key: np.array(array, order="C") for key, array in arrays.items()}  # the file format takes no views
         content = to_bytes(copies, metadata=header | {"sha256": _digest(copies, header)})
         save_bytes(self._folder / f"{name}{self._suffix}.safetensors", content)
 
     def load(self, name: str) -> tuple[dict[str, NDArray[Any]], dict[str, Any]] | None:
-        """Return arrays and state of checkpoint `name`; None where there is none or the run starts afresh."""
+        """Return arrays and state of checkpoint `name`; None where there is none, or the run starts afresh."""
         if self._folder is None or not self._resume:
             return None
         path = self._folder / f"{name}{self._suffix}.safetensors"
@@ -108,7 +115,7 @@ class Checkpoints:
         if header.pop("sha256", None) != _digest(arrays, header):
             raise CheckpointError(f"{path}: not a readable checkpoint (damaged); {_DAMAGED}")
         self._demand_own(path, json.loads(header["identity"]))
-        return arrays, json.loads(header["state"])
+        return (arrays, json.loads(header["state"])) if header.get("options", "") == self._options else None
 
 
 def _demand_format(path: Path, header: Mapping[str, str]) -> None:

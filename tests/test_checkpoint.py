@@ -120,3 +120,10 @@ def test_a_fresh_run_removes_its_old_checkpoints_and_nothing_else(tmp_path):
     Checkpoints(tmp_path, IDENTITY, resume=False)
     assert [p.name for p in tmp_path.iterdir()] == ["weights.safetensors"]
     assert Checkpoints(tmp_path, IDENTITY, resume=True).load("spline") is None
+
+
+def test_a_stage_with_other_options_starts_anew(tmp_path):
+    one, two = (Checkpoints(tmp_path, {"seed": 1}, resume=True).with_options({"load": k}) for k in (1, 2))
+    one.save("steps", {"u": np.ones(2)}, {"step": 3})
+    assert one.load("steps")[1] == {"step": 3} and two.load("steps") is None
+    two.check()  # it is of this run

@@ -40,3 +40,8 @@ def test_killed_once_blocks_are_laid_and_resumed():
 @pytest.mark.slow
 def test_killed_after_each_stage_and_resumed():
     killed("killing_stages.py")
+
+
+@pytest.mark.slow
+def test_a_whole_run_killed_in_each_stage_and_resumed():
+    killed("killing_run.py")

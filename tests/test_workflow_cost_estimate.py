@@ -93,8 +93,8 @@ def test_before_the_layout_parts_and_handles_have_the_times_of_their_kind():
 
 def test_the_unknowns_of_a_level_are_those_of_its_space():
     assert pace.unknowns_of(27000, 1, 3, 1) == pytest.approx(57**3)
-    hexahedra = 1000 * 3**3  # each shares its faces with others
-    assert pace.unknowns_of(hexahedra, 1000, 3, 1) == pytest.approx(1000 * 4**3)
+    assert pace.unknowns_of(1000 * 4**3, 1000, 3, 0) == pytest.approx(1000 * 3**3)  # each shares faces with others
+    assert pace.unknowns_of(1000 * 4**3, 1000, 3, 1) == pytest.approx(1000 * 4**3)
     assert pace.solve_seconds((0, 1), 27000, 1, 3, 3) < pace.solve_seconds((0, 1), 27000, 900, 3, 3)
 
 

@@ -81,6 +81,11 @@ class KeptLevels:
         """Return the options on which the numbers of a level depend, as plain JSON values."""
         return {name: reports.plain(value) for name, value in self.problem_options.values("refine", *UNITS).items()}
 
+    @property
+    def steps(self) -> Checkpoints:
+        """Return the checkpoints of load steps, which belong to this problem on this map."""
+        return self.checkpoints.with_options({"asked": self._asked, "volume": digest(self.folder / VOLUME)})
+
     def save(self, done: Levels) -> None:
         """Keep the levels whose finest solution the output folder holds."""
         state = {"asked": self._asked, "refine": done.refine, "entries": reports.plain(done.entries)}

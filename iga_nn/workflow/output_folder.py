@@ -120,8 +120,10 @@ class RunFolder:
         self.report.update(sections)
         reports.write(self.folder, self.report | {"seconds": self.seconds})
 
-    def finish(self) -> Outcome:
-        """Write the total time, which marks the result as finished, and remove the checkpoint.
+    def finish(self, page: Callable[[Path, reports.Report], object]) -> Outcome:
+        """Write the page, then the total time, which marks the result as finished, and remove the checkpoint.
+
+        page: a function that writes the page of a report into the folder.
 
         A result that a time limit has cut short is none that is finished, and keeps its checkpoint.
         """
@@ -129,6 +131,7 @@ class RunFolder:
             self.report["incomplete"] = said
         self.wait_for_figures()
         self.seconds["total"] = time.perf_counter() - self.started
+        page(self.folder, reports.plain(self.report | {"seconds": self.seconds}))
         self.write(seconds=self.seconds)
         if "incomplete" not in self.report:
             shutil.rmtree(self.folder / CHECKPOINT, ignore_errors=True)

@@ -70,11 +70,13 @@ def end_seconds(vertices: int, patches: int, is_solved: bool) -> float:
 
 
 def unknowns_of(control_points: float, patches: int, degree: int, refine: int) -> float:
-    """Return about how many unknowns a component has on a map with so many control points, those at interfaces once."""
-    shape = (control_points / patches) ** (1.0 / 3.0)
-    spans = max(1.0, shape - degree if patches == 1 else shape - degree + 1.0)
-    more = (spans * 2.0**refine + degree - (patches > 1)) / (spans + degree - (patches > 1))
-    return control_points * more**3
+    """Return about how many unknowns a component has, those at interfaces once.
+
+    control_points: of the map, those at interfaces for each of the patches.
+    """
+    spans = max(1.0, (control_points / patches) ** (1.0 / 3.0) - degree)
+    shared = 1.0 if patches > 1 else 0.0  # layers of each direction that belong to a neighbour
+    return patches * (spans * 2.0**refine + degree - shared) ** 3
 
 
 def solve_seconds(levels: Sequence[int], control_points: float, patches: int, degree: int, components: int) -> float:

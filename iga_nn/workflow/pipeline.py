@@ -508,6 +508,4 @@ def _finish(
 ) -> Outcome:
     """Finish the report, write the page that shows it and return the output folder."""
     scene = scene or scene_of(state, body, solution, problem, units=units)
-    outcome = state.finish()
-    html.write(outcome.folder, outcome.report, scene)
-    return outcome
+    return state.finish(lambda folder, report: html.write(folder, report, scene))

@@ -101,7 +101,7 @@ def _each(
         yield from each_step(body, problem, problem_options.wanted, options, done)
         return
     left = problem_options.levels[len(done.refine) :]
-    checkpoints = None if kept is None else kept.checkpoints
+    checkpoints = None if kept is None else kept.steps
     solutions = each_level(body, problem, problem_options, left, options, checkpoints)
     for level, solution in zip(left, solutions, strict=True):
         yield level, {}, solution

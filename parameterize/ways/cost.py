@@ -13,7 +13,7 @@ from ..refinement import GROWTH
 NEWTON_VERTEX = 6e-4  # passes for each vertex of the surface in a Newton step
 NEWTON_STEP, CERTIFICATE, FIT = 55.0, 270.0, 500.0  # products
 EASY, HARD = (5, 13), (15, 20)  # rounds, and Newton steps a round, on all control points
-LAID_PATCH, LAID_POINT, POINTS_OF_PATCH = 1e-3, 1.3e-4, 29  # seconds of certificate and distances of laid blocks
+LAID_PATCH, LAID_POINT, POINTS_OF_PATCH = 1e-3, 1.3e-4, 64  # seconds of certificate and distances of laid blocks
 EASY_ROUNDS, EASY_POINT = (8, 18), 4.5e-4  # rounds of blocks, and seconds of a round for each control point
 HARD_ROUNDS, HARD_POINT = (12, 24), 1.4e-3  # the same where the surface has long sharp edges
 HARD_AFTER = (3, 14)  # rounds, and Newton steps a round, after each insertion of knots
@@ -23,8 +23,9 @@ HARD_AFTER = (3, 14)  # rounds, and Newton steps a round, after each insertion o
 class Cost:
     """Hold the passes and the products of a map: those of an easy and of a hard surface; and megabytes of its own.
 
-    control_points: of the finished map, at most. patches: its blocks. seconds: of other work, for an easy and a hard
-    surface, on the machine that they were measured on (iga_nn/workflow/pace.py).
+    control_points: of the finished map, at most, those at interfaces for each of the blocks. patches: its blocks.
+    seconds: of other work, for an easy and a hard surface, on the machine that they were measured on
+    (iga_nn/workflow/pace.py).
     """
 
     passes: tuple[float, float]
@@ -36,7 +37,10 @@ class Cost:
 
     @classmethod
     def of_certificate(cls, control_points: float, patches: int) -> "Cost":
-        """Return the cost of a map with so many control points in all that is certified and left as it is."""
+        """Return the cost of a map that is certified and left as it is.
+
+        control_points: of all blocks, those at interfaces for each of them.
+        """
         seconds = LAID_PATCH * patches + LAID_POINT * max(0.0, control_points - POINTS_OF_PATCH * patches)
         return cls((0.0, 0.0), (0.0, 0.0), control_points, patches=patches, seconds=(seconds, seconds))
 
