@@ -35,7 +35,7 @@ def with_inertia(
     if not said:
         return body_force
     if density is None:
-        raise ValueError(f"{said}: give the density of the body, too, such as density=7.85e-9 (t/mm³)")
+        raise ValueError(f"{said}: give the density of the body, too (--density), such as 7.85e-9 t/mm³ of steel")
     if has_exact and body_force is None:
         raise ValueError(f"{said}: the force per volume follows from the exact solution; leave one of them out")
     fields = _accelerations(gravity, acceleration, spin)
