@@ -231,8 +231,13 @@ def volume_in_words(report: Report) -> tuple[str, ...]:
         return ()
     share, sense = abs(volume["difference"]), "less" if volume["difference"] < 0.0 else "more"
     beside = f"{in_percent(share)} {sense} than the mesh's" if share > SAME_VOLUME else "as the mesh's"
+    return cubic(volume["spline"], report), beside
+
+
+def cubic(volume: float, report: Report) -> str:
+    """Return a volume with its unit, if that of lengths is known."""
     unit = report.get("input", {}).get("unit") or solved(report).get("unit")
-    return f"{volume['spline']:.6g}{f' {unit}³' if unit else ''}", beside
+    return f"{volume:.6g}{f' {unit}³' if unit else ''}"
 
 
 def patches_of_solid(solid: Report) -> str:

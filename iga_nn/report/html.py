@@ -168,7 +168,7 @@ def _facts(report: Report) -> list[tuple[str, str, str]]:
         number, beside = volume
         facts.append(("Volume", number, beside))
     facts += [
-        (f"Volume of {solid['name']}", f"{solid['volume']:.6g}", reports.patches_of_solid(solid))
+        (f"Volume of {solid['name']}", reports.cubic(solid["volume"], report), reports.patches_of_solid(solid))
         for solid in quality.get("solids", ())
     ]
     if levels := reports.solved(report).get("levels"):
