@@ -295,7 +295,8 @@ def _quantity(functions: FieldGroup, form: Form, what: str | Quantity, rows: Row
 
 def _default(given: Mapping[str, Quantity]) -> tuple[str, ...]:
     """Return the quantities in a file of a law with these quantities."""
-    return ("stress", "von_mises") if "stress" in given else ("gradient", "flux")
+    more = (name for name in ("plastic_strain", "volume_ratio") if name in given)
+    return ("stress", "von_mises", *more) if "stress" in given else ("gradient", "flux")
 
 
 def _as_columns(flat: Array) -> tuple[Array, Sequence[str]]:
