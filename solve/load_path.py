@@ -21,7 +21,7 @@ from .preparation import prepared
 from .solution import LoadStep, Solution
 
 NEWTON_STEPS = 12  # in a load step; more of them take longer than two steps of half the size
-PATIENCE = 4  # Newton steps in which a residual must halve; after the first ones it falls by its square
+PATIENCE = 4  # Newton steps in which the residual of a body that yields must halve; beyond its limit it does not
 HALVINGS = 7  # of a step, before the load counts as the largest that the body carries
 TOLERANCE = 1e-8  # of the balance, at least: stiff supports leave rounding of 1e-10 and more
 LARGEST_STRAIN = 1.0  # plastic: under it the body flows. A spline resists the flow a little, whatever its strain
@@ -66,7 +66,8 @@ class _Path:
     def advance(self, factor: float) -> None:
         """Go to another share of the load. Raises ConvergenceError, and nothing has changed then."""
         history: list[float] = []
-        full = self.balance.found(self.full, factor, history, PATIENCE)
+        patience = PATIENCE if self.balance.problem.form.history else None
+        full = self.balance.found(self.full, factor, history, patience)
         balance = self.balance.advanced(full)
         strain = _plastic_strain(balance)
         if strain is not None and strain > LARGEST_STRAIN:

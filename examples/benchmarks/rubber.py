@@ -8,7 +8,7 @@ the inner wall s_a and that of the outer wall s_b, the pressure is
     p = int_(s_b)^(s_a) 2 (w1 + w2) (s^2 - s^-2) / (s (s^2 - 1)) ds,        i1 = i2 = 1 + s^2 + s^-2
 
 (Bonet and Wood, Nonlinear Continuum Mechanics for Finite Element Analysis). Loads here are dead: the pressure per area
-at rest is p s_a. The bulk modulus is 1 000 and 10 000 times the shear modulus.
+at rest is p s_a. The bulk modulus is 1 000 times the shear modulus, or 100 times.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ LAWS: dict[str, tuple[type, dict[str, float]]] = {
     "Mooney and Rivlin": (iga_nn.MooneyRivlin, {"c10": 0.35, "c01": 0.15}),
     "Yeoh": (iga_nn.Yeoh, {"c10": 0.5, "c20": -0.02, "c30": 0.005}),
 }
-MESHES = ((2, 0, 1000.0), (2, 1, 1000.0), (3, 0, 1000.0), (3, 0, 10000.0))  # degree, refine, bulk over shear modulus
+MESHES = ((2, 0, 100.0), (2, 0, 1000.0), (3, 0, 1000.0))  # degree, refine, bulk over shear modulus
 HEAD = ("law", "degree, refine", "K / mu", "unknowns", "stretch of the inner wall - 1", "beside the integral")
 
 

@@ -34,7 +34,8 @@ class FiniteOptions(LoadStepOptions):
         material: "neo-hookean" of --shear and --bulk, "mooney-rivlin" of --c10, --c01 and --bulk, or "yeoh" of --c10,
             --c20, --c30 and --bulk; docs/nonlinear.md has their energies.
         shear: shear modulus of neo-hookean.
-        bulk: bulk modulus, the factor of the change of volume; about 1000 times the shear modulus for rubber.
+        bulk: bulk modulus, the factor of the change of volume; about 1000 times the shear modulus for rubber;
+            with more the load steps may end early.
         c10: first constant of mooney-rivlin and of yeoh.
         c01: second constant of mooney-rivlin.
         c20: second constant of yeoh.
