@@ -16,7 +16,7 @@ class Place:
 
 
 def law(**numbers):
-    given = {"young": 200.0, "poisson_ratio": 0.25, "yield_stress": 1.0, "hardening": 10.0} | numbers
+    given = {"young": 200.0, "poisson_ratio": 0.25, "yield_strength": 1.0, "hardening": 10.0} | numbers
     return iga_nn.Plasticity(fix="u0", **given)
 
 
@@ -26,7 +26,7 @@ def sheared(gamma):
     return grad
 
 
-def test_simple_shear_yields_at_the_yield_stress_over_the_root_of_three():
+def test_simple_shear_yields_at_the_yield_strength_over_the_root_of_three():
     yielding = 1.0 / np.sqrt(3.0) / SHEAR
     below = law().flux(None, sheared(0.99 * yielding), None)
     assert below[0, 1, 0, 0] == pytest.approx(0.99 / np.sqrt(3.0))
@@ -65,7 +65,7 @@ def test_the_tangent_is_the_derivative_of_the_stress():
     [
         ({"young": 0.0}, "young must be positive, got 0"),
         ({"poisson_ratio": 0.5}, "poisson_ratio must lie between -1 and 1/2, got 0.5"),
-        ({"yield_stress": -1.0}, "yield_stress must be positive, got -1"),
+        ({"yield_strength": -1.0}, "yield_strength must be positive, got -1"),
         ({"hardening": -1.0}, "hardening must be zero or more, got -1"),
         ({"hardening": "steel"}, "hardening must be a number, got 'steel'"),
     ],

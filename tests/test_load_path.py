@@ -23,7 +23,7 @@ def pulled(law, force, **numbers):
 
 
 def metal(force, hardening=HARDENING):
-    return pulled(iga_nn.Plasticity, force, young=YOUNG, yield_stress=YIELD, hardening=hardening)
+    return pulled(iga_nn.Plasticity, force, young=YOUNG, yield_strength=YIELD, hardening=hardening)
 
 
 def long(solution):
@@ -42,7 +42,7 @@ def test_a_rod_of_metal_hardens_as_its_curve_says():
     assert report.balance.reactions[f"roller '{HELD[0]}'"][0] == pytest.approx(-1.5, rel=1e-6)
 
 
-def test_a_rod_without_hardening_carries_its_yield_stress_alone():
+def test_a_rod_without_hardening_carries_its_yield_strength_alone():
     report = iga_nn.solve(rod(), metal(1.25, 0.0), load_steps=4).report
     assert 0.79 < report.load_factor <= 0.8 + 1e-9 and not report.converged
     assert any(notice.startswith("the body carries 0.79") or "carries 0.8 " in notice for notice in report.notices)
@@ -115,7 +115,7 @@ def test_what_is_kept_of_another_mesh_is_left():
 
 def test_given_displacements_grow_with_the_load():
     held = [iga_nn.Roller(HELD[1]), iga_nn.Roller(HELD[2]), iga_nn.Roller(HELD[0]), iga_nn.Roller("nx > 0.9", 0.1)]
-    law = iga_nn.Plasticity(young=YOUNG, yield_stress=YIELD, hardening=HARDENING, conditions=held)
+    law = iga_nn.Plasticity(young=YOUNG, yield_strength=YIELD, hardening=HARDENING, conditions=held)
     solution = iga_nn.solve(rod(), law, load_steps=2)
     stress = (0.05 + YIELD / HARDENING) / (1.0 / YOUNG + 1.0 / HARDENING)
     assert solution.quantity("von_mises", [[0.5, 0.5, 0.5]])[0] == pytest.approx(stress, rel=1e-3)

@@ -39,12 +39,13 @@ LOADED = {"body_force": "2;2;2", "density": 1.0, "gravity": "0;0;1", "fix": ("y 
 ORTHOTROPIC = {"young": "3;2;2", "poisson_ratio": "0.2;0.2;0.2", "shear_modulus": "1;1;0.83333333"}
 ORTHOTROPIC |= {"alpha": 1e-5, "temperature_change": "20"}
 OTHERS = {
-    PlasticOptions(**LOADED): STEPS | {"young": 2.0, "poisson_ratio": 0.2, "yield_stress": 3.0, "hardening": 1.0},
+    PlasticOptions(**LOADED): STEPS
+    | {"young": 2.0, "poisson_ratio": 0.2}
+    | {"yield_strength": 3.0, "hardening": 1.0, "material": "steel"},
     FiniteOptions(**LOADED): STEPS | {"shear": 2.0, "bulk": 9.0},
-    FiniteOptions(**LOADED, material="mooney-rivlin", c10=1.0): STEPS
-    | {"c10": 2.0, "c01": 1.0, "bulk": 9.0, "material": "yeoh"},
-    FiniteOptions(**LOADED, material="yeoh", c10=1.0): STEPS
-    | {"c10": 2.0, "c20": 1.0, "c30": 1.0, "bulk": 9.0, "material": "mooney-rivlin"},
+    FiniteOptions(**LOADED, law="mooney-rivlin", c10=1.0): STEPS | {"c10": 2.0, "c01": 1.0, "bulk": 9.0, "law": "yeoh"},
+    FiniteOptions(**LOADED, law="yeoh", c10=1.0): STEPS
+    | {"c10": 2.0, "c20": 1.0, "c30": 1.0, "bulk": 9.0, "law": "mooney-rivlin"},
     PoissonOptions(source="2"): SPACE
     | SCALAR
     | {"neumann": ("u1=1",), "robin": ("u1=1:1",), "value": ("x < 1=1",), "flux": ("x < 1=1",)}
@@ -69,7 +70,7 @@ def test_every_option_of_a_problem_is_told_to_the_solver(options, others):
         if field.name in REFUSED and field.name not in others:
             with pytest.raises(InputError, match=f"--{field.name}: "):
                 told(replace(options, **{field.name: REFUSED[field.name]}))
-        elif field.name not in NOT_TOLD | ({"material"} - set(others)):
+        elif field.name not in NOT_TOLD | ({"law", "material"} - set(others)):
             assert told(replace(options, **{field.name: others[field.name]})) != told(options), field.name
 
 
@@ -185,3 +186,10 @@ def test_a_plane_of_a_solid_model_has_a_sign_of_its_own():
     fix, load = body.conditions(3)
     assert str(fix.region) == "plane z = 0"
     assert str(load.region) == "plane x=60 or plane x=-6" and load.text == "0;0;-1"
+
+
+def test_a_metal_of_the_library_yields_at_its_strength():
+    metal = PlasticOptions(material="steel", fix=("u0",), load=("u1=1;0;0",)).problem()
+    assert (metal.young, metal.poisson_ratio, metal.yield_strength) == (210000.0, 0.3, 235.0)
+    with pytest.raises(InputError, match="--material and --young: give one of them"):
+        PlasticOptions(material="steel", young=2.0, fix=("u0",), load=("u1=1;0;0",)).problem()

@@ -67,6 +67,6 @@ def test_a_limit_load_is_a_result_that_says_so(volume, tmp_path):
 
 
 def test_rubber_is_solved_by_its_name(volume, tmp_path):
-    rubber = FiniteOptions(material="yeoh", c10=0.5, bulk=20.0, fix=("u0",), load=("u1=0.2;0;0",), steps=1)
+    rubber = FiniteOptions(law="yeoh", c10=0.5, bulk=20.0, fix=("u0",), load=("u1=0.2;0;0",), steps=1)
     found = solve_to(volume, tmp_path / "out", problem_options=rubber).report["finite"]
-    assert found["material"] == "yeoh" and found["levels"][0]["extremes"]["volume_ratio"]["least"] < 1.01
+    assert found["law"] == "yeoh" and found["levels"][0]["extremes"]["volume_ratio"]["least"] < 1.01

@@ -53,7 +53,7 @@ def supports() -> list[iga_nn.Roller]:
 def solved(share: float, degree: int, refine: int, steps: int) -> iga_nn.solve:
     """Return the solution under a share of the limit."""
     pressed = iga_nn.Pressure("u0", str(share * LIMIT))
-    law = iga_nn.Plasticity(young=YOUNG, poisson_ratio=RATIO, yield_stress=YIELD, conditions=[*supports(), pressed])
+    law = iga_nn.Plasticity(young=YOUNG, poisson_ratio=RATIO, yield_strength=YIELD, conditions=[*supports(), pressed])
     return iga_nn.solve(cylinder(degree), law, refine=refine, load_steps=steps)
 
 
@@ -130,6 +130,7 @@ def main() -> None:
     text = as_markdown(HEAD, rows)
     print(text)
     if out is not None:
+        out.mkdir(parents=True, exist_ok=True)
         save_text(out / "plastic.md", text)
 
 

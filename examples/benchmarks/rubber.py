@@ -65,6 +65,7 @@ def main() -> None:
     text = as_markdown(HEAD, rows)
     print(text)
     if out is not None:
+        out.mkdir(parents=True, exist_ok=True)
         save_text(out / "rubber.md", text)
 
 

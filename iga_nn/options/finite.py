@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from solve.forms.hyperelasticity import Hyperelastic
 
 Name = Literal["neo-hookean", "mooney-rivlin", "yeoh"]
-NUMBERS = {  # of each material, with the volumetric one last
+NUMBERS = {  # of each law, with the volumetric one last
     "neo-hookean": ("shear", "bulk"),
     "mooney-rivlin": ("c10", "c01", "bulk"),
     "yeoh": ("c10", "c20", "c30", "bulk"),
@@ -31,7 +31,7 @@ class FiniteOptions(LoadStepOptions):
     """State an elastic body under large strains, such as rubber, and its load steps; loads are dead.
 
     Attributes:
-        material: "neo-hookean" of --shear and --bulk, "mooney-rivlin" of --c10, --c01 and --bulk, or "yeoh" of --c10,
+        law: "neo-hookean" of --shear and --bulk, "mooney-rivlin" of --c10, --c01 and --bulk, or "yeoh" of --c10,
             --c20, --c30 and --bulk; docs/nonlinear.md has their energies.
         shear: shear modulus of neo-hookean.
         bulk: bulk modulus, the factor of the change of volume; about 1000 times the shear modulus for rubber;
@@ -48,7 +48,7 @@ class FiniteOptions(LoadStepOptions):
         50.0
     """
 
-    material: Name = "neo-hookean"
+    law: Name = "neo-hookean"
     shear: float = 1.0
     bulk: float = 100.0
     c10: float = 0.0
@@ -73,7 +73,7 @@ class FiniteOptions(LoadStepOptions):
     @classmethod
     def law_of(cls, section: Mapping[str, Any]) -> list[Row]:
         """Return the energy with the material and the force."""
-        name = section.get("material", cls.material)
+        name = section.get("law", cls.law)
         said = ", ".join(f"{one} = {section.get(one, getattr(cls, one)):g}" for one in NUMBERS[name])
         return [
             ("equation", f"−∇·P = f, P = ∂W/∂F, F = I + ∇u, {ENERGIES[name]}"),
@@ -81,14 +81,14 @@ class FiniteOptions(LoadStepOptions):
             ("force f per volume", section.get("body_force", "")),
         ]
 
-    def law(self, **data: Any) -> Hyperelastic:
-        """Return the law with its supports and loads. Raises InputError for numbers of another law."""
+    def of_material(self, **data: Any) -> Hyperelastic:
+        """Return the problem of supports and loads with its law. Raises InputError for numbers of another law."""
         from solve.forms.hyperelasticity import MooneyRivlin, NeoHookean, Yeoh
 
         laws: dict[str, type[Hyperelastic]]
         laws = {"neo-hookean": NeoHookean, "mooney-rivlin": MooneyRivlin, "yeoh": Yeoh}
-        own = NUMBERS[self.material]
+        own = NUMBERS[self.law]
         for name in dict.fromkeys(one for numbers in NUMBERS.values() for one in numbers):
             if name not in own and getattr(self, name) != getattr(type(self), name):
-                raise InputError(f"--{name}: {self.material} has {', '.join(f'--{one}' for one in own)} alone")
-        return laws[self.material](**{name: getattr(self, name) for name in own}, **data)
+                raise InputError(f"--{name}: {self.law} has {', '.join(f'--{one}' for one in own)} alone")
+        return laws[self.law](**{name: getattr(self, name) for name in own}, **data)

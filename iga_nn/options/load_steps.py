@@ -68,11 +68,11 @@ class LoadStepOptions(BodyOptions, ABC):
     def _stated(self) -> NonlinearBody:
         """Return the problem, whether the body is held or not. Raises InputError."""
         with input_errors():
-            return self.law(**self.of_body())
+            return self.of_material(**self.of_body())
 
     @abstractmethod
-    def law(self, **data: Any) -> NonlinearBody:
-        """Return the law with its supports and loads. Raises ValueError."""
+    def of_material(self, **data: Any) -> NonlinearBody:
+        """Return the problem of supports and loads with its material. Raises ValueError."""
 
     def solve_options(self) -> SolveOptions:
         """Return the options of the solve on the finest mesh."""

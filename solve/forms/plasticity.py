@@ -33,7 +33,7 @@ class Plasticity(NonlinearBody):
     ----------
     young, poisson_ratio : float
         E > 0 and -1 < nu < 1/2, as of `Elasticity`.
-    yield_stress : float
+    yield_strength : float
         sigma_y > 0, in tension.
     hardening : float
         H >= 0, the slope of the yield stress over the plastic strain; zero by default, which is perfect plasticity.
@@ -55,7 +55,7 @@ class Plasticity(NonlinearBody):
     --------
     >>> import iga_nn
     >>> from solve import benchmark_volume
-    >>> bar = iga_nn.Plasticity(young=200.0, poisson_ratio=0.3, yield_stress=0.2, hardening=20.0,
+    >>> bar = iga_nn.Plasticity(young=200.0, poisson_ratio=0.3, yield_strength=0.2, hardening=20.0,
     ...     conditions=[iga_nn.Fix("u0"), iga_nn.Load("u1", (0.1, 0, 0))])
     >>> iga_nn.solve(benchmark_volume(2), bar, load_steps=2).report.load_factor
     1.0
@@ -63,11 +63,11 @@ class Plasticity(NonlinearBody):
 
     young: Number = 1.0
     poisson_ratio: Number = 0.3
-    yield_stress: Number = 1.0
+    yield_strength: Number = 1.0
     hardening: Number = 0.0
 
     history = 7  # the plastic strain xx, xy, xz, yy, yz, zz, and alpha
-    numbers: ClassVar = ("young", "poisson_ratio", "yield_stress", "hardening")
+    numbers: ClassVar = ("young", "poisson_ratio", "yield_strength", "hardening")
 
     def check_number(self, name: str, value: float) -> None:
         """Raise ValueError for a number of the material that is out of range."""
@@ -120,7 +120,7 @@ class Plasticity(NonlinearBody):
     def _returned(self, grad: Array, x: Any) -> tuple[Array, Array, Array]:
         """Return the trial deviator (3, 3, ...), the plastic flow (...), at least zero, and its direction."""
         shear = self.moduli[1]
-        limit: Any = self.yield_stress
+        limit: Any = self.yield_strength
         hard: Any = self.hardening
         shape = grad.shape[2:]
         before = _state(x, shape)
