@@ -11,6 +11,7 @@ from parameterize.arrays import Array, IntArray
 from parameterize.spline.patch_groups import groups_of
 from parameterize.spline.volume import FACE_NAMES, BSplineVolume
 
+from .discretization.coupling import couplings_of
 from .discretization.face_data import FaceRule, coefficients_of_patches, face_rules, has_face
 from .discretization.grouped import BodyMatrix, Law, assemble_body
 from .discretization.groups import CoefficientLayout, OnPatches
@@ -56,7 +57,7 @@ class Assembled(NamedTuple):
         laws = [
             law._replace(form=WithMass(law.form, factor), source=None, same=(law.same, factor)) for law, factor in each
         ]
-        return self._replace(matrix=self.matrix.of(laws).with_faces(self.matrix.faces))
+        return self._replace(matrix=self.matrix.of(laws).with_faces(self.matrix.faces, self.matrix.couplings))
 
     def mass(self, factors: Array) -> BodyMatrix:
         """Return the mass matrix of one component, times the factor (n,) of each patch.
@@ -124,7 +125,8 @@ def assemble_body_data(patches: Sequence[Stated], options: SolveOptions, unknown
         for face in terms if conditions else ():
             _add_load(face, loads)
         known = _known(patches, loads.layout)
-    return Assembled(matrix.with_faces(terms), loads, known, conditions)
+        couplings = couplings_of(patches, terms, loads.layout) if conditions else ()
+    return Assembled(matrix.with_faces(terms, couplings), loads, known, conditions)
 
 
 def stated_by(patch: Any, problem: BoundaryValueProblem) -> Any:

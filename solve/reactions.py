@@ -12,6 +12,7 @@ import numpy as np
 from parameterize.arrays import Array, in_brackets
 from parameterize.spline.volume import FACE_NAMES
 
+from .discretization.coupling import Coupling
 from .discretization.face_data import FaceRule
 from .discretization.groups import CoefficientLayout, OnPatches
 from .discretization.operator import FaceTerm
@@ -107,10 +108,11 @@ def balance(
     faces: Sequence[FaceTerm],
     coefficients: Sequence[Array],
     products: OnPatches,
+    couplings: Sequence[Coupling] = (),
 ) -> Balance:
     """Return the balance of a solution's coefficients (c, n_u, n_v, n_w) of each patch, and of their products.
 
-    faces: the terms on faces of the patches.
+    faces: the terms on faces of the patches. couplings: those that couple regions.
     """
     processes, layout, total = unknowns.processes, products.layout, unknowns.processes.total
     added = Resultants(problem.form.components, _has_moments(problem, processes, faces))
@@ -138,6 +140,9 @@ def balance(
             own = own - _add_regions(here[0], face, at, on_face, supports, added)
         elif isinstance(face, FaceRule):
             own = own - _add_robin_faces(here, face, on_face, supports)
+    for coupling in couplings:
+        parts = zip(coupling.forces(full), places, strict=True)
+        supports[coupling.condition.role] = np.sum([added.of(part, place) for part, place in parts], axis=0)
     whole = total(own)
     reactions |= {role: total(force) for role, force in supports.items()}
     components = problem.form.components

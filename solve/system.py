@@ -323,7 +323,8 @@ class System:
 
     def _balance(self, full: Sequence[Array]) -> Balance:
         """Return the balance of a solution."""
-        return balance(self.problem, self.patches, self.unknowns, self.matrix.faces, full, self.matrix.apply(full))
+        products, matrix = self.matrix.apply(full), self.matrix
+        return balance(self.problem, self.patches, self.unknowns, matrix.faces, full, products, matrix.couplings)
 
     def _parts(self, full: Sequence[Array]) -> list[Compared]:
         """Return coefficients (c, n_u, n_v, n_w) of each patch with the exact values, zero where none are known."""
@@ -502,7 +503,7 @@ def system_of(
     known = matrix.layout.joined(unknowns.completed(found.known))
     systems = systems_of([patches[number] for number in unknowns.patches], found._replace(known=known))
     components = loads.components
-    operators = operators_of(matrix, components)[0] if is_diagonalized(unknowns, components) else ()
+    operators = operators_of(matrix, components)[0] if is_diagonalized(unknowns, components) and not matrix.couplings else ()
     survey = survey_of(matrix, [[own] for own in operators]) if operators else surveyed(matrix)
     _demand_held(body, problem, systems, matrix.weak, unknowns, survey.free, is_loose)
     is_open = all(unknowns.processes.shared(bool(survey.free.all())))

@@ -18,6 +18,7 @@ from parameterize.spline.volume import BSplineVolume
 from ..forms.form import Form
 from ..forms.jets import PAIRS
 from . import group_kernels, lane_kernels
+from .coupling import Coupling
 from .groups import CoefficientLayout, OnPatches
 from .operator import FaceTerm, Operator, Source, assemble_stack, derivative_of, multiply_law
 from .quadrature import GaussRule
@@ -98,7 +99,7 @@ class BodyMatrix:
 
     parts: the matrix of each patch; what they store at the points is part of the stacks. alone: the numbers of the
     patches that are in no stack, because no other patch has their shape. faces: the terms on faces, those of patches
-    that are alike as one; the part of a patch alone has its own ones, too.
+    that are alike as one; the part of a patch alone has its own ones, too. couplings: the terms that couple regions.
     """
 
     layout: CoefficientLayout
@@ -107,6 +108,7 @@ class BodyMatrix:
     stacks: Sequence[StackMatrix]
     alone: Sequence[int]
     faces: Sequence[FaceTerm] = ()
+    couplings: Sequence[Coupling] = ()
 
     def apply(self, coefficients: Sequence[Array]) -> OnPatches:
         """Return the products (c, n_u, n_v, n_w) with all coefficients of each patch, fixed ones included."""
@@ -118,6 +120,8 @@ class BodyMatrix:
         for patch in self.alone:
             result[patch][:] = self.parts[patch].apply(source[patch])
         self._add_stacked_faces(source, result)
+        for coupling in self.couplings:
+            result.flat[:] += coupling.matrix @ source.flat
         return result
 
     def add_faces(self, coefficients: OnPatches, result: OnPatches) -> None:
@@ -179,13 +183,13 @@ class BodyMatrix:
         each = [(k, one) for k, group in enumerate(groups) for one in stacks_of(group, threads)]
         return [(stack, k, np.array(places)) for k, (places, stack) in each]
 
-    def with_faces(self, faces: Sequence[FaceTerm]) -> "BodyMatrix":
-        """Return the same matrix with terms on faces."""
+    def with_faces(self, faces: Sequence[FaceTerm], couplings: Sequence[Coupling] = ()) -> "BodyMatrix":
+        """Return the same matrix with terms on faces, and terms that couple regions."""
         parts = list(self.parts)
         for patch in self.alone:
             own = {face.name: face for face in faces if _is_of_one(face, [patch])}
             parts[patch] = replace(parts[patch], faces=own) if own else parts[patch]
-        return replace(self, parts=parts, faces=faces)
+        return replace(self, parts=parts, faces=faces, couplings=couplings)
 
     def of(self, laws: Sequence[Law]) -> "BodyMatrix":
         """Return the matrix of other laws on the same patches, without terms on faces."""
@@ -196,7 +200,7 @@ class BodyMatrix:
         found = self.of([law._replace(source=None, component=component) for law in self.laws])
         both = zip(found.parts, self.parts, strict=True)
         parts = [replace(block, faces=own.faces, component=component) for block, own in both]
-        return replace(found, parts=parts, faces=self.faces)
+        return replace(found, parts=parts, faces=self.faces, couplings=self.couplings)
 
 
 def assemble_body(layout: CoefficientLayout, laws: Sequence[Law], threads: int) -> tuple[BodyMatrix, OnPatches]:

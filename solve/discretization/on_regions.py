@@ -10,7 +10,7 @@ from typing import Any, Protocol
 import numpy as np
 from scipy.sparse import csr_array
 
-from parameterize.arrays import Array, IntArray, in_brackets
+from parameterize.arrays import Array, IntArray, Mask, in_brackets
 from parameterize.spline.body import all_control_points, size_of
 from parameterize.spline.bspline import basis_derivatives, breakpoints, sparse_rows
 from parameterize.spline.interface import axis_side
@@ -236,6 +236,12 @@ class Acting:
         """Return the mask (m,) of the points where the condition with this number holds."""
         return self.codes >> (condition + 1) & 1 == 1
 
+    @property
+    def coupled(self) -> Mask:
+        """Return the mask (m,) of the points whose u is coupled with that of others."""
+        holding = (self.holding(i) for i, one in enumerate(self.problem.conditions) if one.is_coupled)
+        return np.asarray(sum(holding, np.zeros(len(self.weights), dtype=bool)))
+
     def held(self) -> tuple[Array, Array]:
         """Return the projector P (c, c, m) onto the directions along which u is given, and P g (c, m)."""
         c, m = self.problem.form.components, len(self.weights)
@@ -346,7 +352,7 @@ class _Builder:
         form, at, weights, acting = self.problem.form, self.rule.at, self.rule.weights, self._acting
         x, normal = acting.x, acting.normal
         projector, given = acting.held()
-        gamma, slowest = self._gamma(x, normal, np.flatnonzero(projector.any(axis=(0, 1))))
+        gamma, slowest = self._gamma(x, normal, np.flatnonzero(projector.any(axis=(0, 1)) | acting.coupled))
         loads, factor = acting.natural(projector)
         axis, side = axis_side(self.name)
         tables, slope = self._tables(axis, side)

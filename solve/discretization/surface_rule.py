@@ -62,7 +62,7 @@ class Faces:
         return layer.reshape(len(self), -1, 3)
 
     @cached_property
-    def _surface(self) -> SplineStack:
+    def surface(self) -> SplineStack:
         """Return the maps of the faces alone, constant across them."""
         group, keep = self.group, [-self.side]
         degrees = [0 if a == self.axis else p for a, p in enumerate(group.degrees)]
@@ -76,12 +76,12 @@ class Faces:
 
     def points(self, owners: IntArray, across: Array) -> Array:
         """Return the points (3, m) of the faces `owners` (m,)."""
-        return np.ascontiguousarray(self._surface.at(owners, self.parameters(across)).T)
+        return np.ascontiguousarray(self.surface.at(owners, self.parameters(across)).T)
 
     def points_and_areas(self, owners: IntArray, across: Array) -> tuple[Array, Array]:
         """Return the points, and the outward normals (3, m), as long as the surface element."""
         orders = VALUE, UNITS[(self.axis + 1) % 3], UNITS[(self.axis + 2) % 3]
-        x, first, second = self._surface.derivatives_at(owners, self.parameters(across), orders)
+        x, first, second = self.surface.derivatives_at(owners, self.parameters(across), orders)
         signs = self.hands[owners] if self.side else -self.hands[owners]
         area = signs[:, None] * np.cross(first, second)
         return np.ascontiguousarray(x.T), np.ascontiguousarray(area.T)

@@ -168,16 +168,27 @@ class WeakFace:
 
     def _fluxes(self, points: IntArray, shape: tuple[int, ...]) -> csr_array:
         """Return the matrix of the terms with fluxes at some points, of components one after another."""
+        here, slopes = self._slopes(points, shape)
+        test = sum(_at_points(own[..., points]) @ slope for own, slope in zip(self._tests, slopes, strict=True))
+        held = _at_points(self.held[..., points])
+        return csr_array(here.T @ held @ self.flux_matrix(points, shape) + test.T @ held @ here)
+
+    def flux_matrix(self, points: IntArray, shape: tuple[int, ...]) -> csr_array:
+        """Return the matrix (c m, c k n_u n_v n_w) from coefficients to t at some points (m,).
+
+        Rows and columns have the components one after another. shape: (c, n_u, n_v, n_w).
+        """
+        here, slopes = self._slopes(points, shape)
+        by_value, *by_slopes = self._traces
+        trace = sum(_at_points(own[..., points]) @ slope for own, slope in zip(by_slopes, slopes, strict=True))
+        return csr_array(trace + _at_points(by_value[..., points]) @ here)
+
+    def _slopes(self, points: IntArray, shape: tuple[int, ...]) -> tuple[csr_array, list[csr_array]]:
+        """Return the matrices from coefficients to u, and to its slopes across and along the face, at some points."""
         tables = [table[points] for table in self.tables]
         here, behind = (self._of_components(tables[0], layer, shape) for layer in self.layers)
         along = (self._of_components(table, self.layers[0], shape) for table in tables[1:])
-        slopes = [self.slope * (here - behind), *along]
-        tests, (by_value, *by_slopes) = self._tests, self._traces
-        test = sum(_at_points(own[..., points]) @ slope for own, slope in zip(tests, slopes, strict=True))
-        trace = sum(_at_points(own[..., points]) @ slope for own, slope in zip(by_slopes, slopes, strict=True))
-        trace = trace + _at_points(by_value[..., points]) @ here
-        held = _at_points(self.held[..., points])
-        return csr_array(here.T @ held @ trace + test.T @ held @ here)
+        return here, [self.slope * (here - behind), *along]
 
     def _of_components(self, table: csr_array, layer: tuple[int | slice, ...], shape: tuple[int, ...]) -> csr_array:
         """Return a table (m, k n_b n_c) of the functions of a layer as that (c m, c k n_u n_v n_w) of all functions."""

@@ -100,7 +100,7 @@ class BoundaryValueProblem:
         if "source" not in data:
             self._check_derived("source")
         for condition in self._all:
-            if condition.datum is None and not condition.is_essential:
+            if condition.datum is None and not condition.is_essential and not condition.is_coupled:
                 self._check_derived(condition.role)
 
     @property

@@ -66,6 +66,7 @@ class Condition:
     option: ClassVar[str]  # its name on the command line and among keywords, such as "total_force"
     entries: ClassVar[int | None] = None  # of the datum; None for one a component of u
     is_essential: ClassVar[bool] = False  # whether values of u, or of its normal component, are given
+    is_coupled: ClassVar[bool] = False  # whether u is coupled with u elsewhere, with no data of its own
     factor_name: ClassVar[str] = "factor"
     is_along_normal: ClassVar[bool] = False  # so that u has as many components as space
     has_point: ClassVar[bool] = False  # whether its data are a vector and a point
@@ -113,6 +114,11 @@ class Condition:
     def is_support(self) -> bool:
         """Return whether the condition answers loads: it gives values of u, or a flux that depends on u."""
         return self.is_essential or self.factor is not None
+
+    @property
+    def parts(self) -> "tuple[Condition, ...]":
+        """Return the conditions on one region each that make up this one."""
+        return (self,)
 
     @property
     def text(self) -> str:

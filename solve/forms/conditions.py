@@ -14,6 +14,7 @@ from parameterize.spline.volume import FACE_NAMES
 
 from .body_loads import Hydrostatic, Load, Pressure
 from .condition import Condition as Condition
+from .coupled import Cyclic
 from .general_conditions import Exchange, Flux, Robin, Value
 from .region import PATCH_FACE, Region, Regions, regions_of
 from .supports import Fix, Foundation, Roller, Spring, Symmetry, TotalSpring, Turn
@@ -21,6 +22,7 @@ from .total_loads import Bearing, Moment, RemoteForce, SharedOut, TotalForce
 
 __all__ = [
     "Bearing",
+    "Cyclic",
     "Exchange",
     "Fix",
     "Flux",
@@ -44,8 +46,8 @@ GivenRegions = Regions | Mapping[Any, Any]  # Region or str -> data
 OnFaces = Mapping[str, Any]
 
 KINDS: dict[str, type[Condition]] = {kind.option: kind for kind in map(globals().__getitem__, __all__)}
-OF_SCALARS = {"value": Value, "inflow": Flux, "exchange": Exchange}  # by keyword; those of Poisson and Problem
-STATED_BY_POINT = (Fix, Roller, Symmetry, Load, Pressure, Spring, Foundation, Turn, Hydrostatic)
+OF_SCALARS = {"value": Value, "inflow": Flux, "exchange": Exchange, "cyclic": Cyclic}  # by keyword; those of Poisson and Problem
+STATED_BY_POINT = (Fix, Roller, Symmetry, Load, Pressure, Spring, Foundation, Turn, Hydrostatic, Cyclic)
 STATED_IN_TOTAL = (TotalForce, Moment, RemoteForce, Bearing, TotalSpring)
 OF_BODIES: dict[str, type[Condition]] = {kind.option: kind for kind in (*STATED_BY_POINT, *STATED_IN_TOTAL)}
 
@@ -57,7 +59,7 @@ def listed(given: Iterable[Condition]) -> tuple[Condition, ...]:
     found = tuple(given)
     if wrong := [one for one in found if not isinstance(one, Condition)]:
         raise TypeError(f"conditions must be objects such as iga_nn.Value('u0', 1), got {wrong[0]!r:.80}")
-    return found
+    return tuple(part for one in found for part in one.parts)
 
 
 def shares_out(condition: Condition) -> TypeGuard[SharedOut | TotalSpring]:

@@ -30,7 +30,8 @@ def _of_faces(unknowns: Unknowns, matrix: BodyMatrix, components: int) -> csc_ar
     size = components * int(np.prod(unknowns.shape))
     numbers = unknowns.spread(np.arange(1.0, size + 1.0).reshape(components, *unknowns.shape))  # zero where fixed
     places = matrix.layout.joined(numbers).flat.astype(np.int64) - 1
-    faces = matrix.matrix_of(matrix.shared_faces).tocoo()
+    found = matrix.matrix_of(matrix.shared_faces)
+    faces = sum((coupling.matrix for coupling in matrix.couplings), found).tocoo()
     row, column = places[faces.row], places[faces.col]
     free = (row >= 0) & (column >= 0)
     return coo_array((faces.data[free], (row[free], column[free])), shape=(size, size)).tocsc()
