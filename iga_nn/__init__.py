@@ -24,6 +24,7 @@ _HOME = {  # module, and the name there where it is another one; type checkers r
     "BSplineVolume": "parameterize.spline.volume",
     "Bearing": "solve.forms.conditions",
     "Body": "parameterize.spline.body",
+    "Cyclic": "solve.forms.conditions",
     "Elasticity": "solve",
     "ElasticityOptions": "iga_nn.options",
     "Exchange": "solve.forms.conditions",

@@ -25,6 +25,7 @@ from .discretization.weak import WeakFace
 from .field import Points
 from .forms.boundary_value_problem import BoundaryValueProblem
 from .forms.conditions import Condition
+from .forms.coupled import demand_uncoupled
 from .forms.form import Form, check_law
 from .forms.mass import Mass, WithMass
 from .forms.problem import Problem
@@ -109,6 +110,8 @@ def assemble_body_data(patches: Sequence[Stated], options: SolveOptions, unknown
 
     patches: those of this process. unknowns: those of all processes that share the body; by default one has all of it.
     """
+    if unknowns is not None and len(unknowns.processes.shared(None)) > 1:
+        demand_uncoupled(patches[0].problem, "one process solves it: leave comm out")
     shared, conditions = unknowns or Window(patches[0].space), patches[0].problem.conditions
     has_totals = patches[0].problem.has_totals
     with shared.agreed():

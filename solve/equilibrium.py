@@ -26,6 +26,7 @@ from .discretization.weak import WeakFace
 from .field import BodyField
 from .forms.at_rest import AtRest
 from .forms.boundary_value_problem import BoundaryValueProblem
+from .forms.coupled import demand_uncoupled
 from .forms.form import Form
 from .forms.under_law import UnderLaw
 from .linear.krylov import generalized_residuals
@@ -80,6 +81,7 @@ class Equilibrium:
                 "newton: fluxes alone do not determine the solution: give a value, or an exchange, on a face or a "
                 "region"
             )
+        demand_uncoupled(problem, "it couples regions in linear problems only")
         found = assemble_body_data(laws_of_faces(problem, patches), options)
         problem, patches = problem.sharing(found.conditions), found.stated(patches)
         matrix, loads, known = found.matrix, found.loads, found.known

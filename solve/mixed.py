@@ -21,6 +21,7 @@ from .discretization.pressure import LEAST_DEGREE, Pressures
 from .discretization.unknowns import unknowns_of
 from .field import BodyField
 from .forms.boundary_value_problem import BoundaryValueProblem
+from .forms.coupled import demand_uncoupled
 from .forms.elasticity import Elasticity
 from .forms.under_law import UnderLaw
 from .linear.pressure_mass import PressureMass
@@ -167,6 +168,7 @@ def build_mixed(
     body: Body, problem: BoundaryValueProblem, patches: Sequence[PatchProblem], options: SolveOptions
 ) -> MixedSystem:
     """Return the mixed system of an elastic body; arguments as in `system.build`."""
+    demand_uncoupled(problem, "it is solved with formulation='displacement' only")
     start = time.process_time()
     laws: list[Any] = [patch.problem for patch in patches]
     with one_blas_thread():

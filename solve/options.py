@@ -13,6 +13,7 @@ from .ask import Ask, asks_of
 from .discretization.grading import Grading
 from .field import FieldOnBody
 from .forms.boundary_value_problem import BoundaryValueProblem
+from .forms.coupled import demand_uncoupled
 
 DEVICES = ("cpu", "cuda")
 FORMULATIONS = ("mixed", "displacement")
@@ -104,6 +105,7 @@ def check_device(device: str, problem: BoundaryValueProblem) -> None:
         raise ValueError(f"device must be one of {', '.join(DEVICES)}, got {device!r}")
     if device != "cpu":
         form = problem.form
+        demand_uncoupled(problem, f"it is solved on device='cpu' only, got device={device!r}")
         if not form.symmetric or (form.components > 1 and not form.constant):
             raise ValueError(
                 f"{type(form).__name__} is solved on device='cpu' only, got device={device!r}: on a GPU laws are "

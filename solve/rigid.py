@@ -14,6 +14,7 @@ from parameterize.arrays import Array, Mask
 from parameterize.spline.body import all_control_points, as_body, size_of
 from parameterize.spline.bspline import greville, interpolate_grid
 
+from .discretization.coupling import Coupling
 from .discretization.face_data import FaceRule
 from .discretization.operator import FaceTerm
 from .discretization.quadrature import gauss_rule, map_planes
@@ -43,6 +44,7 @@ def rigid_motions(system: System) -> Array:
         motions = _without_energy([system.patches[i] for i in part])
         supports = [one for i in part for one in _supports(system.patches[i], fixed[i], motions)]
         supports += [one for face in system.matrix.faces for one in _on_faces(face, part, motions)]
+        supports += [_by_coupling(one, motions) for one in system.matrix.couplings if one.is_within(part)]
         free = motions.combined(_unheld(supports)) if supports and motions.count else motions
         parts = [np.zeros((free.count, *patch.loads.shape)) for patch in system.patches]
         for i in part:
@@ -127,6 +129,12 @@ def _on_faces(face: FaceTerm, part: Sequence[int], motions: Affine) -> Iterator[
     elif isinstance(face, FaceRule):  # Robin's term, with its factor in the measure
         moves = motions(face.points)[..., (face.measure > 0.0) & own[:, None, None]]
         yield _rows(moves), _rows(moves)
+
+
+def _by_coupling(coupling: Coupling, motions: Affine) -> Support:
+    """Return what a coupling of regions holds."""
+    moves, held = coupling.moves(motions)
+    return _rows(moves), _rows(held)
 
 
 def _by_region(face: WeakFace, own: Mask, moves: Array) -> Support:

@@ -188,7 +188,7 @@ def check_problem(body: BodyLike, problem: BoundaryValueProblem, comm: Any = Non
     faces, loads = found.matrix.weak, found.loads
     demand_area(problem, faces, unknowns.processes, glued.patches)
     if problem.fixes_nothing and problem.conditions:
-        demand_supports(problem, faces, unknowns.processes, glued.patches)
+        demand_supports(problem, faces, unknowns.processes, glued.patches, found.matrix.couplings)
     if problem.fixes_nothing and not problem.form.has_reaction:
         balanced(unknowns.collect(loads), unknowns)
     if problem.exact is not None:

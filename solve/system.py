@@ -382,7 +382,10 @@ class System:
         """Yield the terms of conditions on regions, with their spaces and the coefficients of their patches."""
         coefficients = self.matrix.layout.joined(full)
         for face in self.matrix.weak:
-            yield face, self.patches[face.patches[0]].space, coefficients.of(face.patches)
+            whole = face
+            for coupling in self.matrix.couplings:
+                whole = whole if whole is not face else coupling.completed(face, coefficients)
+            yield whole, self.patches[face.patches[0]].space, coefficients.of(face.patches)
 
     @property
     def has_given_values(self) -> bool:
@@ -505,7 +508,7 @@ def system_of(
     components = loads.components
     operators = operators_of(matrix, components)[0] if is_diagonalized(unknowns, components) and not matrix.couplings else ()
     survey = survey_of(matrix, [[own] for own in operators]) if operators else surveyed(matrix)
-    _demand_held(body, problem, systems, matrix.weak, unknowns, survey.free, is_loose)
+    _demand_held(body, problem, systems, matrix, unknowns, survey.free, is_loose)
     is_open = all(unknowns.processes.shared(bool(survey.free.all())))
     if is_open and not is_loose and isinstance(systems[0].matrix, FormOperator):
         raise ValueError(
@@ -566,15 +569,16 @@ def _demand_held(
     body: Body,
     problem: BoundaryValueProblem,
     systems: Sequence[PatchSystem],
-    weak: Sequence[WeakFace],
+    matrix: BodyMatrix,
     unknowns: Unknowns,
     free: Mask,
     is_loose: bool,
 ) -> None:
     """Raise ValueError where a region has no area, and where a part of a body that is not loose is free to move.
 
-    weak: the terms of conditions on regions. free: which of the patches leave a constant free.
+    matrix: has the terms of conditions on regions. free: which of the patches leave a constant free.
     """
+    weak, couplings = matrix.weak, matrix.couplings
     processes, here = unknowns.processes, dict(zip(unknowns.patches, systems, strict=True))
     demand_area(problem, weak, processes, body.patches)
     if is_loose:
@@ -584,10 +588,11 @@ def _demand_held(
         part = [here[number] for number in numbers if number in here]
         own = np.flatnonzero(np.isin(unknowns.patches, numbers))
         faces = [face.on(own) for face in weak] if len(parts) > 1 else weak
+        within = [one for one in couplings if one.is_within(numbers)]
         named = listed([f"p{number}" for number in numbers])
         try:
             if problem.conditions and not processes.total(sum(len(system.space.dirichlet) for system in part)):
-                demand_supports(problem, faces, processes, [body.patches[number] for number in numbers])
+                demand_supports(problem, faces, processes, [body.patches[number] for number in numbers], within)
         except ValueError as error:
             raise ValueError(f"{named}: {error}" if len(parts) > 1 else str(error)) from None
         if len(parts) > 1:

@@ -30,6 +30,8 @@ class BodyOptions(ProblemOptions, ABC):
             free.
         roller: regions held along their normal only.
         symmetry: regions where a plane of symmetry cuts the body; held along their normal as by a roller.
+        cyclic: sector of a body, each as "REGION, REGION about z", or "about (0, 0, 1) through (1, 2, 3)": displacements
+            on the second cut are those on the first, turned. The angle follows from the regions.
         turn: regions turned by a small angle in radians about an axis through a point, each as
             "REGION=VECTOR at POINT".
         spring: regions held by springs, force per area and displacement, each as "REGION=FORMULA".
@@ -58,6 +60,7 @@ class BodyOptions(ProblemOptions, ABC):
     fix: tuple[str, ...] = ()
     roller: tuple[str, ...] = ()
     symmetry: tuple[str, ...] = ()
+    cyclic: tuple[str, ...] = ()
     turn: tuple[str, ...] = ()
     spring: tuple[str, ...] = ()
     total_spring: tuple[str, ...] = ()

@@ -83,6 +83,8 @@ class Raised:
 
 def why_not_raised(system: System) -> str:
     """Return why a system has no raised space; "" where it has one."""
+    if system.matrix.couplings:
+        return "regions are coupled by a cyclic symmetry"
     if max(max(patch.space.degrees) for patch in system.stated) >= MOST_DEGREE:
         return f"degree {MOST_DEGREE} is the highest one"
     count = system.problem.form.components * _count(system, is_divided=False)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Hashable, Iterator, Sequence
+from collections.abc import Callable, Hashable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
@@ -56,6 +56,17 @@ class Stated(Protocol):
     @property
     def space(self) -> TrialSpace:
         """Return the trial space."""
+
+
+class Coupled(Protocol):
+    """Describe terms that couple regions, as they hold motions of a body."""
+
+    @property
+    def weights(self) -> Array:
+        """Return the weights (m,) of integrals."""
+
+    def moves(self, motions: Callable[[Array], Array]) -> tuple[Array, Array]:
+        """Return motions (k, c, m) at the points, functions of points (3, m), and what of them the terms hold."""
 
 
 def weak_faces(patches: Sequence[Stated], same: Sequence[Hashable]) -> list[WeakFace]:
@@ -144,11 +155,15 @@ def demand_area(
 
 
 def demand_supports(
-    problem: BoundaryValueProblem, faces: Sequence[WeakFace], processes: Processes, volumes: Patches
+    problem: BoundaryValueProblem,
+    faces: Sequence[WeakFace],
+    processes: Processes,
+    volumes: Patches,
+    couplings: Sequence[Coupled] = (),
 ) -> None:
     """Raise ValueError where the supports leave a motion free that the law does not resist (`Form.free_motions`).
 
-    Arguments as in `demand_area`; for a body that no Dirichlet data hold.
+    Arguments as in `demand_area`, and couplings of regions; for a body that no Dirichlet data hold.
     """
     holding = [face.weights * (np.einsum("ccm->m", face.projector) + face.is_sprung) for face in faces]
     area = processes.total(sum(float(weights.sum()) for weights in holding))
@@ -164,6 +179,10 @@ def demand_supports(
         kept = np.einsum("cdm,kdm->kcm", face.holding, motions)
         moved = moved + np.einsum("kcm,lcm,m->kl", motions, motions, face.weights * (weights > 0.0))
         held = held + np.einsum("kcm,lcm,m->kl", kept, kept, face.weights)
+    for coupling in couplings:
+        here, jump = coupling.moves(lambda x: problem.form.free_motions((x - middle[:, None]) / size))
+        moved = moved + np.einsum("kcm,lcm,m->kl", here, here, coupling.weights)
+        held = held + np.einsum("kcm,lcm,m->kl", jump, jump, coupling.weights)
     free = _unheld(processes.total(moved) / area, processes.total(held) / area)
     if free is not None:
         said = ", ".join(f"{part:.2g}" for part in (free / np.abs(free).max()).round(3) + 0.0)

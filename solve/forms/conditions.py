@@ -46,8 +46,8 @@ GivenRegions = Regions | Mapping[Any, Any]  # Region or str -> data
 OnFaces = Mapping[str, Any]
 
 KINDS: dict[str, type[Condition]] = {kind.option: kind for kind in map(globals().__getitem__, __all__)}
-OF_SCALARS = {"value": Value, "inflow": Flux, "exchange": Exchange, "cyclic": Cyclic}  # by keyword; those of Poisson and Problem
-STATED_BY_POINT = (Fix, Roller, Symmetry, Load, Pressure, Spring, Foundation, Turn, Hydrostatic, Cyclic)
+OF_SCALARS = {"value": Value, "inflow": Flux, "exchange": Exchange}  # by keyword; those of Poisson and Problem
+STATED_BY_POINT = (Fix, Roller, Symmetry, Load, Pressure, Spring, Foundation, Turn, Hydrostatic)
 STATED_IN_TOTAL = (TotalForce, Moment, RemoteForce, Bearing, TotalSpring)
 OF_BODIES: dict[str, type[Condition]] = {kind.option: kind for kind in (*STATED_BY_POINT, *STATED_IN_TOTAL)}
 

@@ -177,6 +177,13 @@ class Image(Condition):
         return np.zeros((1, *x.shape[1:]))
 
 
+def demand_uncoupled(problem: Any, why: str) -> None:
+    """Raise ValueError for a problem with a condition that couples regions. why: what does not work, in a line."""
+    for condition in problem.conditions:
+        if isinstance(condition, Cyclic):
+            raise ValueError(f"{condition.role}: {why}")
+
+
 def _split(text: str) -> list[str]:
     """Return the parts of a text between commas that stand in no brackets and in no quotes."""
     parts, depth, quote = [""], 0, ""
