@@ -32,7 +32,6 @@ from .discretization.quadrature import GaussRule, operator_rule
 from .discretization.residual import Solved
 from .discretization.space import embedded, longest_edges
 from .discretization.unknowns import Glued, Unknowns, Window
-from .discretization.weak import WeakFace
 from .field import BodyField, FieldOnBody, SplineField
 from .forms.boundary_value_problem import BoundaryValueProblem
 from .forms.mass import Mass
@@ -506,7 +505,9 @@ def system_of(
     known = matrix.layout.joined(unknowns.completed(found.known))
     systems = systems_of([patches[number] for number in unknowns.patches], found._replace(known=known))
     components = loads.components
-    operators = operators_of(matrix, components)[0] if is_diagonalized(unknowns, components) and not matrix.couplings else ()
+    operators = (
+        operators_of(matrix, components)[0] if is_diagonalized(unknowns, components) and not matrix.couplings else ()
+    )
     survey = survey_of(matrix, [[own] for own in operators]) if operators else surveyed(matrix)
     _demand_held(body, problem, systems, matrix, unknowns, survey.free, is_loose)
     is_open = all(unknowns.processes.shared(bool(survey.free.all())))

@@ -87,7 +87,9 @@ def test_heat_is_equal_on_both_cuts():
 def test_a_sector_keeps_the_motions_along_and_about_its_axis():
     system = iga_nn.discretize(quarter_ring(), turning(iga_nn.Cyclic(FIRST, SECOND)), degree=2)
     assert rigid_motions(system).shape[1] == 0
-    loose = iga_nn.Elasticity(young=100.0, conditions=[iga_nn.Load("nz > 0.99", (0, 0, 1)), iga_nn.Cyclic(FIRST, SECOND)])
+    loose = iga_nn.Elasticity(
+        young=100.0, conditions=[iga_nn.Load("nz > 0.99", (0, 0, 1)), iga_nn.Cyclic(FIRST, SECOND)]
+    )
     sliding = iga_nn.Elasticity(young=100.0, conditions=[*loose.conditions, iga_nn.Roller("nz < -0.99")])
     with pytest.raises(ValueError, match=r"turns about x, y, z, .* is not held"):
         iga_nn.solve(quarter_ring(), sliding)
@@ -98,7 +100,7 @@ def test_a_sector_keeps_the_motions_along_and_about_its_axis():
     ("cut", "said"),
     [
         (("nx < -5", SECOND), "no part of the boundary lies there"),
-        ((FIRST, SECOND, "x"), "no whole part of 360 degrees"),
+        ((FIRST, SECOND, "x"), "do not fit each other: the first, turned by -72 degrees, and the second lie"),
         ((FIRST, SECOND, "z", (0.3, 0.0, 0.0)), "no whole part of 360 degrees"),
         ((FIRST, "nz > 0.9"), "their areas are 1 and 2.35"),
         ((FIRST, f"{FIRST} or {SECOND}"), "overlap"),

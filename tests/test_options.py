@@ -30,6 +30,7 @@ BODY = (
     {"fix": ("x < 1",), "roller": ("x < 1",), "body_force": "1;1;1"}
     | {"symmetry": ("x < 1",), "load": ("x < 1=1;1;1",), "pressure": ("x < 1=1",), "spring": ("x < 1=1",)}
     | dict.fromkeys(("total_spring", "foundation"), ("x < 1=1",))
+    | {"cyclic": ("u0, u1 about z",)}
     | dict.fromkeys(("total_force", "moment", "bearing"), ("x < 1=1;1;1",))
     | dict.fromkeys(("turn", "hydrostatic", "remote_force"), ("x < 1=1;1;1 at (0, 0, 1)",))
     | {"density": 2.0, "gravity": "0;1;0", "acceleration": "1;0;0", "spin": "0;0;1 at (0, 0, 0)"}
@@ -49,7 +50,7 @@ OTHERS = {
     PoissonOptions(source="2"): SPACE
     | SCALAR
     | {"neumann": ("u1=1",), "robin": ("u1=1:1",), "value": ("x < 1=1",), "flux": ("x < 1=1",)}
-    | {"exchange": ("x < 1=1:1",)},
+    | {"exchange": ("x < 1=1:1",), "cyclic": ("u0, u1 about z",)},
     ElasticityOptions(body_force="2;2;2", density=1.0, gravity="0;0;1", **ORTHOTROPIC): SPACE
     | VECTOR
     | {"traction": ("u1=1;1;1",), "young": "4;2;2", "poisson_ratio": "0.1;0.2;0.2", "formulation": "mixed"}

@@ -30,7 +30,7 @@ class BodyOptions(ProblemOptions, ABC):
             free.
         roller: regions held along their normal only.
         symmetry: regions where a plane of symmetry cuts the body; held along their normal as by a roller.
-        cyclic: sector of a body, each as "REGION, REGION about z", or "about (0, 0, 1) through (1, 2, 3)": displacements
+        cyclic: two cuts of a sector, as "REGION, REGION about z", or "about (0, 0, 1) through (1, 2, 3)": displacements
             on the second cut are those on the first, turned. The angle follows from the regions.
         turn: regions turned by a small angle in radians about an axis through a point, each as
             "REGION=VECTOR at POINT".

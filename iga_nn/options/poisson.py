@@ -45,8 +45,8 @@ class PoissonOptions(ProblemOptions):
             regions are given, all else of the boundary has no flux, and the source is zero unless it is given.
         flux: regions with a given flux kappa du/dn into the body, each as "REGION=FORMULA".
         exchange: regions where kappa du/dn = alpha (outside - u), each as "REGION=ALPHA:OUTSIDE".
-        cyclic: sector of a body, each as "REGION, REGION about z", or "about (0, 0, 1) through (1, 2, 3)": u is equal on
-            both cuts. The angle follows from the regions.
+        cyclic: two cuts of a sector, as "REGION, REGION about z", or "about (0, 0, 1) through (1, 2, 3)": u is equal
+            on both. The angle follows from the regions.
 
     Examples:
         >>> import iga_nn

@@ -34,9 +34,9 @@ from .on_regions import Stated
 from .space import TrialSpace
 from .weak import WeakFace
 
-# Share of gamma of `weak`, whose bound is for faces that share their span with others. With that the sum of w t . t / gamma
-# is 0.05 to 0.28 of the energy on boxes, flat, tall and sheared ones, of degrees 1 to 3: the form stays coercive down to
-# that share. On a sector of a flange a half takes 82 iterations, the whole gamma 110, and without coupling it is 56.
+# Share of gamma of `weak`, whose bound is for faces that share their span with others. With all of gamma the sum of
+# w t . t / gamma is 0.05 to 0.28 of the energy, on boxes, flat, tall and sheared ones of degrees 1 to 3: the form is
+# coercive down to that share. On a sector of a flange a half takes 82 iterations, all 110, and no coupling 56.
 GAMMA = 0.5
 FIT = 2e-3  # share of a body's size by which the image of a region may lie off the other region
 WHOLE = 0.01  # share by which 360 degrees over the angle may differ from a whole number
@@ -48,11 +48,12 @@ OPPOSITE = 0.99  # cosine of the angle between normals, on average, of an image 
 class Coupling:
     """Hold the terms that couple two regions.
 
-    condition: the cyclic symmetry. count: how many sectors make up the whole. turn: (3, 3), R in space.
-    rotation: (c, c), R for the components of u. first, second: the points of the first region and their images. weights: (m,), of integrals. gamma: (m,),
-    Nitsche's parameter. x, normal: (3, m), of the first region. distance: the largest one of an image from the region.
-    jump: (c m, size), [u] of the coefficients of all patches, as `OnPatches.flat` has them; flux: the same of R t. patches: of the body. first_faces, other_faces: the terms of conditions with points
-    of the two regions, and which points of theirs.
+    condition: the cyclic symmetry. count: how many sectors make up the whole. turn: (3, 3), R in space. rotation: (c,
+    c), R for the components of u. first, second: the points of the first region and their images. weights: (m,), of
+    integrals. gamma: (m,), Nitsche's parameter. distance: the largest one of an image from the region. jump: (c m,
+    size), [u] of the coefficients of all patches, as `OnPatches.flat` has them; flux: the same of R t. patches: of the
+    body. x, normal: (3, m), of the first region. first_faces, other_faces: the terms of conditions with points of the
+    two regions, and which points of theirs.
     """
 
     condition: Cyclic
@@ -83,9 +84,7 @@ class Coupling:
     def penalty(self, spaces: Sequence[TrialSpace], layout: CoefficientLayout, share: float) -> csr_array:
         """Return the matrix of a share of int gamma [u] . [v] for functions of other spaces on the patches."""
         jump = _jump(self.rotation, spaces, layout, self.first, self.second)
-        return csr_array(
-            jump.T @ diags_array(np.tile(share * self.weights * self.gamma, len(self.rotation))) @ jump
-        )
+        return csr_array(jump.T @ diags_array(np.tile(share * self.weights * self.gamma, len(self.rotation))) @ jump)
 
     def is_within(self, part: Sequence[int]) -> bool:
         """Return whether both regions lie on some patches, given by their numbers."""
@@ -291,7 +290,9 @@ def _jump(
 ) -> csr_array:
     """Return the matrix (c m, size) from coefficients of all patches to u at second points minus R u at first ones."""
     here, there = (_values(spaces, layout, points, len(rotation)) for points in (first, second))
-    rows = [there[i] - sum(factor * own for factor, own in zip(row, here, strict=True)) for i, row in enumerate(rotation)]
+    rows = [
+        there[i] - sum(factor * own for factor, own in zip(row, here, strict=True)) for i, row in enumerate(rotation)
+    ]
     return csr_array(vstack(rows))
 
 
@@ -304,9 +305,7 @@ def _values(
     kinds = np.array([of_space[id(space)] for space in spaces])[points.patches]
     for kind in np.unique(kinds).tolist():
         space, chosen = spaces[kind], np.flatnonzero(kinds == kind)
-        each = [
-            basis_derivatives(space.knots[a], space.degrees[a], points.parameters[chosen, a]) for a in range(3)
-        ]
+        each = [basis_derivatives(space.knots[a], space.degrees[a], points.parameters[chosen, a]) for a in range(3)]
         (u, bu), (v, bv), (w, bw) = [(first[:, None] + np.arange(b.shape[-1]), b[0]) for first, b in each]
         own = (bu[:, :, None, None] * bv[:, None, :, None] * bw[:, None, None, :]).reshape(len(chosen), -1)
         place = (u[:, :, None, None] * space.shape[1] + v[:, None, :, None]) * space.shape[2] + w[:, None, None, :]

@@ -41,9 +41,7 @@ def nearest_on(
     masks: which points (m,) of each of the faces belong to the region; the search starts from those. volumes: of all
     patches.
     """
-    each = [
-        (face, np.flatnonzero(mask), _faces(face, volumes)) for face, mask in zip(faces, masks, strict=True)
-    ]
+    each = [(face, np.flatnonzero(mask), _faces(face, volumes)) for face, mask in zip(faces, masks, strict=True)]
     samples = np.concatenate([np.asarray(face.x)[:, rows] for face, rows, _ in each], axis=1).T
     of_face = np.concatenate([np.full(len(rows), number) for number, (_, rows, _) in enumerate(each)])
     owners = np.concatenate([face.owners[rows] for face, rows, _ in each])

@@ -116,7 +116,7 @@ class Condition:
         return self.is_essential or self.factor is not None
 
     @property
-    def parts(self) -> "tuple[Condition, ...]":
+    def parts(self) -> tuple[Condition, ...]:
         """Return the conditions on one region each that make up this one."""
         return (self,)
 
