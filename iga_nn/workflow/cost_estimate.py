@@ -46,6 +46,7 @@ LIBRARIES, FIGURES, PER_CONTROL_POINT, PER_VERTEX, PER_UNKNOWN = 560.0, 400.0, 8
 # Of a solve, counted in numbers of 8 bytes; tests compare them with the memory of real solves.
 SYMMETRIC, OTHER = 25, 85  # an unknown: vectors of conjugate gradients or GMRES, preconditioner, norms
 BLOCK, CONSTANT = 6, 9  # a quadrature point: a tensor, kept or for a moment; the geometry of a constant law
+TANGENTS = 2  # at a quadrature point of a law that is not linear: derivatives of u and its gradient, now and at rest
 PLANES = 30  # arrays of a plane of points, where the error is measured
 EVERYWHERE = 3  # an unknown: the solution, whole on every process
 
@@ -227,6 +228,7 @@ def _patch_memory(
     points = float(np.prod(rule.shape, dtype=float))
     unknowns = float(form.components * space.dofs)
     kept = CONSTANT * form.constant + BLOCK + form.has_reaction
+    kept += 0 if form.linear else TANGENTS * (4 * form.components) ** 2 + 2 * form.history
     (_, *degrees), (_, *functions) = space.degrees, space.shape
     plane = min(POINTS, math.prod((p + 2) * n for p, n in zip(degrees, functions, strict=True)))
     shared = points * kept + unknowns * (SYMMETRIC if form.symmetric else OTHER)
