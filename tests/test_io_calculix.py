@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from ccx_results import displacement, temperature
+from example_files import load
 
 import iga_nn
 from iga_nn.cli.commands import main
@@ -17,6 +17,8 @@ from iga_nn.io.element_shapes import C3D8, C3D20, SHAPES
 from iga_nn.io.elements import Elements, cut
 from parameterize.spline.body import Body, as_body
 from solve import benchmark_volume
+
+calculix = load("benchmarks/calculix")
 
 CCX = pytest.mark.skipif(shutil.which("ccx") is None, reason="CalculiX is not installed")
 
@@ -125,7 +127,7 @@ def test_ccx_gives_the_displacement_of_a_bar(tmp_path):
         young={"a": 100.0, "b": 50.0}, poisson_ratio=0.0, fix="nx < -0.9", load={"nx > 0.9": (1, 0, 0)}
     )
     deck = write_calculix(tmp_path / "bar.inp", bar(), problem)
-    found = displacement(solved_by_ccx(tmp_path, "bar"), deck)
+    found = calculix.values(solved_by_ccx(tmp_path, "bar"), deck)
     x = deck.elements.points[:, 0]
     exact = np.where(x < 2.0, x / 100.0, 0.02 + (x - 2.0) / 50.0)
     used = deck.numbers > 0
@@ -139,7 +141,7 @@ def test_ccx_agrees_with_the_solve_on_a_curved_body(tmp_path, element, within):
     problem = iga_nn.Elasticity(young=210.0, fix="u0", pressure={"u1": 1}, body_force=(0, 0, "-x"))
     solution = iga_nn.solve(body, problem, refine=1)
     deck = write_calculix(tmp_path / "wavy.inp", body, problem, parts=2, element=element)
-    found = displacement(solved_by_ccx(tmp_path, "wavy"), deck)
+    found = calculix.values(solved_by_ccx(tmp_path, "wavy"), deck)
     patches, parameters = deck.elements.place_of_nodes
     used = deck.numbers > 0
     ours = solution(parameters)
@@ -156,7 +158,7 @@ def test_ccx_agrees_with_the_solve_of_heat(tmp_path):
     )
     solution = iga_nn.solve(bar(), problem, refine=1)
     deck = write_calculix(tmp_path / "heat.inp", bar(), problem)
-    found = temperature(solved_by_ccx(tmp_path, "heat"), deck)
+    found = calculix.values(solved_by_ccx(tmp_path, "heat"), deck)[:, 0]
     patches, parameters = deck.elements.place_of_nodes
     ours = np.array([solution.patches[p](one[None])[0] for p, one in zip(patches, parameters, strict=True)])
     used = deck.numbers > 0

@@ -356,7 +356,7 @@ def export_volume(
     Args:
         to: gismo (G+Smo XML), mfem (NURBS mesh), vtk (exact Bezier cells), view (samples for slicing in ParaView),
             json (splinepy's), calculix (Abaqus' and CalculiX' input file, with the problem of the run),
-            gmsh (curved hexahedra), step or iges (spline faces of the boundary).
+            gmsh (curved hexahedra), bezier (Bezier extraction), step or iges (spline faces of the boundary).
         out: file to write; the volume's stem with the format's ending in the current folder by default.
         solution: solution.npz to export, too: as point data u (vtk, view), or in a file beside it (NAME_u.xml, NAME.gf,
             NAME_u.json).

@@ -39,7 +39,7 @@ def export(
     volume : str or Path
         File with the volume, or the output folder of a run: then its solution is exported, too.
     to : str
-        "gismo", "mfem", "vtk", "view", "json", "calculix", "gmsh", "step" or "iges".
+        "gismo", "mfem", "vtk", "view", "json", "calculix", "gmsh", "bezier", "step" or "iges".
     out : str or Path, optional
         By default the stem of the volume, or the name of the folder, with the format's ending, in the current folder.
     solution : str or Path, optional

@@ -12,7 +12,7 @@ from parameterize.surface.part import PartSurface
 from solve.field import FieldOnBody
 from solve.forms.boundary_value_problem import BoundaryValueProblem
 
-from . import boundary_faces, calculix, geopdes, gismo, gmsh, mfem, mfem_writer, splinepy, view, vtk
+from . import bezier, boundary_faces, calculix, geopdes, gismo, gmsh, mfem, mfem_writer, splinepy, view, vtk
 from .patches_of_files import body_of
 from .words import faults_of, text_of
 
@@ -92,6 +92,9 @@ FORMATS = {
     ),
     "calculix": Format(".inp", _calculix, takes=("samples", "element")),
     "gmsh": Format(".msh", _gmsh, takes=("samples", "element")),
+    "bezier": Format(
+        ".bext", lambda path, given: bezier.write_bezier_extraction(path, given.body), holds_solution=False
+    ),
     "step": Format(".step", lambda path, given: boundary_faces.write_step(path, given.body), holds_solution=False),
     "iges": Format(".igs", lambda path, given: boundary_faces.write_iges(path, given.body), holds_solution=False),
 }
