@@ -45,7 +45,7 @@ def points_and_values(mesh, field, components):
     return np.array(points), np.array(values)
 
 
-@pytest.mark.parametrize("refine", [0, 1])
+@pytest.mark.parametrize("refine", [0, 2])
 def test_mfem_has_the_values_of_a_solution_on_several_patches(tmp_path, refine):
     body = turned_ring()
     solution = solve_problem(body, Poisson(exact="exp(x+z)*sin(y)"), refine=refine)

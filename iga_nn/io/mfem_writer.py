@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from parameterize.arrays import Array, Floats, IntArray
-from parameterize.spline.body import Body, BodyLike, as_body, shared_numbers
+from parameterize.spline.body import Body, BodyLike, as_body, merged, shared_numbers
 from parameterize.spline.interface import Interface, axis_side
 from parameterize.spline.orientation import hands_of
 from parameterize.spline.volume import BSplineVolume
@@ -83,7 +83,8 @@ def write_mfem_field(path: Path, field: FieldOnBody, volume: BodyLike) -> None:
 
 def _on_knots_of_all(field: FieldOnBody, body: Body) -> Body:
     """Return the same body with the knots of a solution on it. Raises InputError where the degrees differ."""
-    return Body(tuple(map(_on_knots_of, field.patches, body)), body.interfaces, body.solids)
+    patches = merged(list(map(_on_knots_of, field.patches, body)), body.interfaces)  # knots are inserted with rounding
+    return Body(patches, body.interfaces, body.solids)
 
 
 def _on_knots_of(field: SplineField, volume: BSplineVolume) -> BSplineVolume:

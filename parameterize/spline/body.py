@@ -129,7 +129,7 @@ class Body(Brief, Shown):
             raise ValueError(f"tolerance must be a share of the body's size, from 0 to 1, got {tolerance!r:.80}")
         size = size_of(given)
         found = interfaces_of(_matches(given, tolerance * size, size))
-        return cls(_merged(given, found), found, PatchSolids.of(solids, len(given)))
+        return cls(merged(given, found), found, PatchSolids.of(solids, len(given)))
 
     @classmethod
     def from_splinepy(cls, splines: Any) -> "Body":
@@ -372,7 +372,7 @@ def numbers_of_classes(count: int, pairs: IntArray) -> IntArray:
     return np.asarray(np.cumsum(rank)[first[labels]] - 1)
 
 
-def _merged(patches: Sequence[BSplineVolume], interfaces: Sequence[Interface]) -> tuple[BSplineVolume, ...]:
+def merged(patches: Sequence[BSplineVolume], interfaces: Sequence[Interface]) -> tuple[BSplineVolume, ...]:
     """Return the patches with one control point where interfaces make several one, the first of them.
 
     Its weight goes with it, except to patches whose weights there are other ones by a factor.
