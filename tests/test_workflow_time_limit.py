@@ -14,6 +14,7 @@ from iga_nn.cli.commands import main
 from iga_nn.errors import InputError
 from iga_nn.options.texts import duration
 from iga_nn.workflow import time_limit
+from iga_nn.workflow.output_folder import RunFolder
 from iga_nn.workflow.time_limit import clock, demand_time
 from parameterize.time_limit import OutOfTime, closing, limited, reserving
 from solve import solve_with
@@ -123,3 +124,13 @@ def test_a_solve_resumes_too(in_folder, slow):
     assert len(report()["poisson"]["levels"]) == 2 and report()["poisson"]["levels"][:1] == first
     assert not Path("out/checkpoint").exists() and main([*solve, "--resume"]) == 0
     assert main([*solve[:-4], "--exact", "x*y", "--out", "out", "--resume"]) == 2
+
+
+def test_figures_are_left_out_where_the_limit_is_long_over(tmp_path, monkeypatch):
+    monkeypatch.setattr(time_limit, "LATEST", 0.0)
+    state = RunFolder(tmp_path)
+    with limited(10.0):
+        assert not time_limit.is_late()
+    with limited(-1.0):
+        state.draw("map", volume=None)
+        assert state.report["not_drawn"] == {"figures of the map": "the time limit is over"}

@@ -20,9 +20,10 @@ from ..report import document as reports
 from ..report.artifacts import REPORT, Part, files_of
 from .drawing import Failures, Figures, draw, drawing
 from .painter import Painter
-from .time_limit import stopped_in_words
+from .time_limit import is_late, stopped_in_words
 
 CHECKPOINT = "checkpoint"
+NO_TIME = "the time limit is over"
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,6 +62,9 @@ class RunFolder:
 
         Where there is a painter, they are done at `wait_for_figures`.
         """
+        if is_late():
+            self._tell({f"figures of the {part}": NO_TIME})
+            return
         figures = Figures(self.folder.resolve(), part, known, self.vector)
         with self.timed("report"):
             if self.painter is None or not self.painter.begin(figures):
@@ -68,7 +72,9 @@ class RunFolder:
 
     def wait_for_figures(self) -> None:
         """Wait until all figures are drawn, and add those that could not be to the report."""
-        if self.painter is not None:
+        if self.painter is not None and is_late():
+            self._tell({"some figures": NO_TIME})
+        elif self.painter is not None:
             with self.timed("report"):
                 self._tell(self.painter.end())
 

@@ -1,7 +1,7 @@
 """Measures how fast this machine is now, and holds what was measured of stages whose work is not counted otherwise.
 
 All numbers are processor seconds of one machine, on which `work` takes REFERENCE of them; `pace` compares a machine,
-as it is now and with what else runs on it, with that one. docs/benchmarks.md sets forecasts beside what runs took.
+as it is now and with what else runs on it, with that one. docs/benchmarks/forecasts.md has forecasts beside the times.
 """
 
 import os
@@ -14,7 +14,7 @@ Clock = Callable[[], float]
 REPEATS = 3
 REFERENCE = 0.066  # of `work`
 
-END, END_VERTEX = 5.5, 4e-4  # libraries, figures, page; for each vertex of the surface
+END, END_VERTEX = 7.0, 4e-4  # libraries, figures, page; for each vertex of the surface
 END_SOLVED, END_PATCH = 6.0, 1.5e-3  # the same of a solution; for each of several patches
 LEVEL = 0.5  # of a solve
 SCALAR, VECTOR = (1.5e-5, 5e-5), (6e-5, 2.2e-4)  # for each unknown, on one patch and on several

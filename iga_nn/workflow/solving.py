@@ -29,7 +29,7 @@ from .levels import KeptLevels, Levels
 from .output_folder import RunFolder
 from .pace import level_seconds, pace
 from .refining import each_step, stopped_notice
-from .time_limit import demand_time, for_page
+from .time_limit import demand_time, for_page, is_late
 
 log = logging.getLogger(__name__)
 
@@ -310,7 +310,9 @@ def scene_of(
     problem: BoundaryValueProblem | None = None,
     units: Units = NO_UNITS,
 ) -> Any:
-    """Return the interactive view of a body and a solution on it; None where it cannot be drawn."""
+    """Return the interactive view of a body and a solution on it; None where it cannot be drawn, or time is over."""
+    if is_late():
+        return None
     with state.timed("report"), state.drawing("interactive view"):
         from ..report import viewer
 

@@ -4,6 +4,7 @@ import ctypes
 import signal
 import sys
 import threading
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from types import FrameType
@@ -23,10 +24,12 @@ from parameterize.time_limit import (
 from ..options.texts import duration
 from ..rounding import clock as clock_of
 from ..signals import is_compiling
+from .pace import end_seconds, pace
 
 TICK = 0.5  # seconds between two looks at the clock
 NEEDED = 0.15  # share of a limit that the map leaves for its certificate, the files and the page
-PAGE, PAGE_PATCH, MOST_OF_PAGE = 6.0, 0.02, 0.3  # seconds, also a patch, of figures and page; share of a limit
+MOST_OF_PAGE = 0.4  # share of a limit that figures and page of a solution may keep for themselves
+LATE, LATEST = 0.05, 5.0  # share of a limit, and seconds, after which no figure is begun
 WISHED = 0.45  # share of a limit that a certified map leaves, for the solve, where one follows
 
 
@@ -75,17 +78,25 @@ def for_later(is_solved: bool) -> Iterator[None]:
 def for_page(body: BodyLike) -> Iterator[None]:
     """Let the block, which solves, leave the time that figures and page of a solution on a body take."""
     limit = present_limit()
-    most = 0.0 if limit is None else MOST_OF_PAGE * limit.seconds
-    with reserving(min(most, PAGE + PAGE_PATCH * len(as_body(body)))):
+    needed = 0.0
+    if limit is not None:
+        needed = min(MOST_OF_PAGE * limit.seconds, pace() * end_seconds(0, len(as_body(body)), is_solved=True))
+    with reserving(needed):
         yield
 
 
 def demand_time(refine: int, seconds: float) -> None:
     """Raise OutOfTime where less than so many seconds are left, which a level is known to take."""
-    if (left := seconds_left()) < seconds:
-        taken = f"refine {refine} takes about {clock_of(seconds)}, and {clock_of(max(left, 0.0))} are left"
+    if 0.0 < (left := seconds_left()) < seconds:
+        taken = f"refine {refine} takes about {clock_of(seconds)}, and {clock_of(left)} are left"
         raise OutOfTime(f"{present_limit()}: {taken}")
     check_time()
+
+
+def is_late() -> bool:
+    """Return whether the time limit is so long over that figures are left out, so that the page comes at last."""
+    limit = present_limit()
+    return limit is not None and time.monotonic() > limit.end + max(LATE * limit.seconds, LATEST)
 
 
 def stopped_in_words() -> str:

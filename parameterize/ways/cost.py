@@ -13,7 +13,7 @@ from ..refinement import GROWTH
 NEWTON_VERTEX = 6e-4  # passes for each vertex of the surface in a Newton step
 NEWTON_STEP, CERTIFICATE, FIT = 55.0, 270.0, 500.0  # products
 EASY, HARD = (5, 13), (15, 20)  # rounds, and Newton steps a round, on all control points
-LAID_PATCH, LAID_POINT, POINTS_OF_PATCH = 1e-3, 1.3e-4, 64  # seconds of certificate and distances of laid blocks
+LAID_PATCH, LAID_POINT, POINTS_OF_PATCH = 1.5e-3, 1.3e-4, 64  # seconds of certificate and distances of laid blocks
 EASY_ROUNDS, EASY_POINT = (8, 18), 4.5e-4  # rounds of blocks, and seconds of a round for each control point
 HARD_ROUNDS, HARD_POINT = (12, 24), 1.4e-3  # the same where the surface has long sharp edges
 HARD_AFTER = (3, 14)  # rounds, and Newton steps a round, after each insertion of knots

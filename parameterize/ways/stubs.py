@@ -85,7 +85,7 @@ class WithStubs(Way):
 
     def cost(self, task: MappingTask) -> Cost:
         """Return the cost of the rounds of the body alone, and of those with its rods."""
-        points, blocks = _CONTROL_POINTS**3 / 2.0, 20 * max(task.surface.genus, 1)
+        points, blocks = float(_CONTROL_POINTS**3), 20 * max(task.surface.genus, 1)
         return Cost.of_blocks(points, blocks, is_sharp=True)
 
 
