@@ -190,7 +190,10 @@ def test_a_plane_of_a_solid_model_has_a_sign_of_its_own():
 
 
 def test_a_metal_of_the_library_yields_at_its_strength():
-    metal = PlasticOptions(material="steel", fix=("u0",), load=("u1=1;0;0",)).problem()
+    options = PlasticOptions(material="steel", fix=("u0",), load=("u1=1;0;0",))
+    metal, said = options.problem(), options.values()
+    assert (said["young"], said["unit"], said["materials"][0]["yield_strength"]) == (None, "mm", 235.0)
+    assert options.law_of(said)[1][0] == "material steel"
     assert (metal.young, metal.poisson_ratio, metal.yield_strength) == (210000.0, 0.3, 235.0)
     with pytest.raises(InputError, match="--material and --young: give one of them"):
         PlasticOptions(material="steel", young=2.0, fix=("u0",), load=("u1=1;0;0",)).problem()

@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 from ..errors import InputError
 from .load_steps import LoadStepOptions
-from .materials import materials_of, of_all
-from .problem import Formula, Row, Sheet  # noqa: F401  # Formula is in the annotations of the base class
+from .materials import MaterialOptions, materials_of, of_all
+from .problem import Formula, Row, Sheet, Units  # noqa: F401  # Formula is in the annotations of the base class
 from .texts import numbers
 
 if TYPE_CHECKING:
+    from solve import Material
     from solve.forms.plasticity import Plasticity
 
 OF_LIBRARY = ("young", "poisson_ratio", "yield_strength")
@@ -79,9 +80,40 @@ class PlasticOptions(LoadStepOptions):
         material = "Young's modulus E = {}, Poisson's ratio ν = {}, yield strength σy = {}".format(*said)
         return [
             ("equation", "−∇·σ = f, von Mises stress at most σy + H α, α the equivalent plastic strain; small strains"),
-            ("material", f"{section.get('material') or material}, hardening H = {said[-1]}"),
+            *MaterialOptions.material_rows({"materials": section.get("materials", ())}),
+            *([] if section.get("materials") else [("material", material)]),
+            ("hardening H", said[-1]),
             ("force f per volume", section.get("body_force", "")),
         ]
+
+    @property
+    def units(self) -> Units:
+        """Return the units for colour bars; those of a material where none are given."""
+        if self.material is None:
+            return super().units
+        first = next(iter(self._materials.values()))
+        return Units(first.unit, self.stress_unit or first.stress_unit)
+
+    def values(self, *left_out: str) -> dict[str, Any]:
+        """Return the options by name, with the units and the numbers of materials."""
+        found = super().values(*left_out)
+        if self.material is None:
+            return found
+        own = {"unit": self.units.displacement, "stress_unit": self.units.stress}
+        numbers = [one.as_dict() for one in self._materials.values()]
+        own = {name: unit for name, unit in own.items() if name in found} | dict.fromkeys(OF_LIBRARY)
+        return {**found, **own, "materials": numbers}
+
+    def density_given(self) -> Any:
+        """Return the density, or that of each patch or solid; by default that of the material. Raises InputError."""
+        if self.material is None or self.density is not None:
+            return super().density_given()
+        return of_all({who: one.density for who, one in self._materials.items()})
+
+    @property
+    def _materials(self) -> dict[Any, Material]:
+        """Return the material of each solid or patch; of all of them by the key None. Raises InputError."""
+        return materials_of(self.material, self.unit, self.stress_unit)
 
     def of_material(self, **data: Any) -> Plasticity:
         """Return the problem of supports and loads with its material. Raises InputError."""
@@ -99,7 +131,7 @@ class PlasticOptions(LoadStepOptions):
                 raise InputError(
                     f"--material and --{name.replace('_', '-')}: give one of them, the material has its own"
                 )
-        found = materials_of(self.material, self.unit, self.stress_unit)
+        found = self._materials
         for one in found.values():
             if not isinstance(one.young, float) or one.yield_strength is None:
                 raise InputError(f"--material {one.name}: has no yield strength, or differs along its axes")
