@@ -22,7 +22,7 @@ from solve.study import benchmark_volume
 
 DEFECTS = ("folds.png", "meeting.png")
 DRAW = {figure.file: f"iga_nn.figures.{figure.draw}" for figure in ARTIFACTS if figure.draw}  # file -> function
-OTHERS = ("blocks.png", "named_faces.png", "regions.png", "study.png", "modes.png")
+OTHERS = ("blocks.png", "named_faces.png", "regions.png", "study.png", "modes.png", "load.png")
 TWO_LEVELS = PoissonOptions(refine=(0, 1))  # of the usual three
 MAP = [file for file in DRAW if file not in (*DEFECTS, *OTHERS)]
 
