@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 import pyvista
-from known_meshes import HEX8, HEX20, HEX27, TET4, TET10, bent, grid
+from known_meshes import HEX8, HEX20, HEX27, HEX64, TET4, TET10, bent, grid
 from vtkmodules.vtkIOExodus import vtkExodusIIReader
 from written_meshes import ABAQUS, GMSH, VTK, as_vtk, write_exodus, write_inp, write_msh
 
@@ -57,6 +59,24 @@ def test_c3d27_with_its_inner_node_last_is_refused(tmp_path):
 def test_vtk(tmp_path, kind, ending):
     as_vtk(grid(kind, (2, 2, 2), bent)).save(tmp_path / f"a{ending}")
     expect_bent(iga_nn.load_mesh(tmp_path / f"a{ending}"), kind, 0)
+
+
+def test_vtu_before_version_2_1_has_two_edges_of_hexahedra_exchanged(tmp_path):
+    """VTK's own reader says the same of the nodes of these files."""
+    as_vtk(grid(HEX64, (1, 1, 1), bent)).save(tmp_path / "new.vtu", binary=False)
+    text = (tmp_path / "new.vtu").read_text()
+    (tmp_path / "old.vtu").write_text(re.sub(r'(<VTKFile[^>]*version=")[\d.]+', r"\g<1>1.0", text))
+    seen = pyvista.read(tmp_path / "old.vtu")
+    found = iga_nn.load_mesh(tmp_path / "old.vtu").blocks[0].nodes[0]
+    assert (
+        found.tolist() == seen.cells[1:].tolist() != iga_nn.load_mesh(tmp_path / "new.vtu").blocks[0].nodes[0].tolist()
+    )
+
+
+def test_exodus_on_hdf5_names_the_package(tmp_path):
+    (tmp_path / "a.exo").write_bytes(b"\x89HDF\r\n\x1a\n" + bytes(100))
+    with pytest.raises(iga_nn.InputError, match="netCDF4|damaged"):
+        iga_nn.load_mesh(tmp_path / "a.exo")
 
 
 @pytest.mark.parametrize("kind", [HEX8, HEX20, HEX27, TET4, TET10], ids=str)

@@ -1,6 +1,7 @@
-"""Reads the solid cells of .vtu, .vtk and CGNS files by VTK: linear, quadratic, Lagrange and Bezier."""
+"""Reads the solid cells of .vtu files, and of .vtk and CGNS files by VTK: linear, quadratic, Lagrange, Bezier."""
 
-from collections.abc import Iterator
+import re
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -9,10 +10,11 @@ import numpy as np
 from parameterize.arrays import Array, IntArray
 from parameterize.meshes.kinds import SERENDIPITY, ElementKind, hexahedron, node_count, tetra
 from parameterize.meshes.mesh import Block, VolumeMesh
+from parameterize.surface.readers.vtu import grid_of
 
+MAX_BYTES = 16 << 30  # that the arrays of a .vtu may unpack to
 DAMAGED = "VTK does not read it: the file is damaged, or no such file; export it again"
 READERS = {
-    ".vtu": ("vtkIOXML", "vtkXMLUnstructuredGridReader"),
     ".vtk": ("vtkIOLegacy", "vtkUnstructuredGridReader"),
     ".cgns": ("vtkIOCGNSReader", "vtkCGNSReader"),
 }
@@ -29,7 +31,7 @@ def read_vtk_mesh(path: Path) -> VolumeMesh | None:
     """Return the solid cells of a file, numbered from 0, None where there are none. Raises ValueError for a bad one."""
     if path.suffix.lower() == ".vtk" and not _is_unstructured(path):
         return None
-    grids = list(_grids(path))
+    grids = list(_pieces(path) if path.suffix.lower() == ".vtu" else _grids(path))
     if not any(len(types) for _, types, *_ in grids):
         return None
     found: dict[ElementKind, list[tuple[IntArray, IntArray]]] = {}
@@ -68,6 +70,32 @@ def _rational(weights: Array) -> Any:
 
 
 Grid = tuple[Array, IntArray, IntArray, IntArray, IntArray | None, Array | None]
+
+
+def _pieces(path: Path) -> Iterator[Grid]:
+    """Yield the pieces of a .vtu as `_grids` does; VTK's own reader may end the program where a file is damaged.
+
+    Before version 2.1 of the format the last two upright edges of Lagrange and Bezier hexahedra changed places.
+    """
+    version, pieces = grid_of(path.read_bytes(), MAX_BYTES)
+    numbers = re.match(r"(\d+)\.(\d+)", version)
+    is_old = numbers is not None and (int(numbers[1]), int(numbers[2])) < (2, 1)
+    for piece in pieces:
+        offsets = np.append(0, piece.ends)
+        corners = piece.corners
+        if is_old:
+            for row in np.flatnonzero(np.isin(piece.types, HEXAHEDRA)).tolist():
+                own = corners[offsets[row] : offsets[row + 1]]
+                degrees = _degrees_of(72, len(own)) if piece.degrees is None else piece.degrees[row].tolist()
+                _exchange(own, degrees)
+        yield piece.points, piece.types, offsets, corners, piece.degrees, piece.weights
+
+
+def _exchange(nodes: IntArray, degrees: Sequence[int]) -> None:
+    """Exchange the nodes of the last two edges of a hexahedron along w, in place."""
+    p, q, r = degrees
+    first, count = 8 + 4 * (p - 1) + 4 * (q - 1) + 2 * (r - 1), r - 1
+    nodes[first : first + 2 * count] = np.roll(nodes[first : first + 2 * count], count)
 
 
 def _grids(path: Path) -> Iterator[Grid]:

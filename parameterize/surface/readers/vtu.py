@@ -3,6 +3,7 @@
 import re
 import warnings
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 from xml.etree import ElementTree
 
@@ -42,12 +43,6 @@ def _read(
 ) -> Content:
     """Read a file of that kind of data set, piece by piece."""
     data = file.data
-    if b"<VTKFile" not in data[:4096] or b"</VTKFile>" not in data[-256:]:
-        raise MeshError(f"not a whole {suffix}: no <VTKFile> ... </VTKFile>; {DAMAGED}")
-    if b"<!DOCTYPE" in data or b"<!ENTITY" in data:
-        raise MeshError(
-            f"the {suffix} declares a document type, whose entities are not expanded: remove the declaration"
-        )
     root, decoder = _opened(data, most_bytes(file.max_faces), suffix, kind)
     steps = [grid.get("TimeValues", "").split() for grid in root.iter(kind)]
     notices = tuple(f"the first of {len(times)} time steps read" for times in steps if len(times) > 1)
@@ -66,6 +61,12 @@ def _read(
 
 def _opened(data: bytes, limit: int, suffix: str, kind: str) -> tuple[ElementTree.Element, Decoder]:
     """Return the tree of the file without its appended data, and the decoder of its arrays."""
+    if b"<VTKFile" not in data[:4096] or b"</VTKFile>" not in data[-256:]:
+        raise MeshError(f"not a whole {suffix}: no <VTKFile> ... </VTKFile>; {DAMAGED}")
+    if b"<!DOCTYPE" in data or b"<!ENTITY" in data:
+        raise MeshError(
+            f"the {suffix} declares a document type, whose entities are not expanded: remove the declaration"
+        )
     mark = APPENDED.search(data)
     text = data[: mark.start()] + b"</VTKFile>" if mark else data
     try:
@@ -90,15 +91,65 @@ def _piece(piece: ElementTree.Element, decoder: Decoder) -> Piece:
     if not m:
         return np.empty((0, 3)), [], {}
     places = _places(piece, decoder, n)
-    types = decoder.numbers(_array(piece, "Cells", "types"), m).astype(np.int64)
-    ends = decoder.numbers(_array(piece, "Cells", "offsets"), m).astype(np.int64)
+    types, ends, corners = _cells(piece, decoder, m)
     sizes = np.diff(ends, prepend=0)
-    if sizes.min() < 0:
-        raise MeshError(f"the offsets of the .vtu's cells decrease; {DAMAGED}")
-    corners = decoder.numbers(_array(piece, "Cells", "connectivity"), int(ends[-1])).astype(np.int64)
     order = np.argsort(types, kind="stable")  # cells are returned kind by kind
     marks = {name: decoder.numbers(array, m)[order] for name, array in _marks(piece).items()}
     return places, by_kind(types, sizes, ends, corners), marks
+
+
+@dataclass(frozen=True, eq=False)
+class GridPiece:
+    """A piece of a grid: points (n, 3), types (m,), ends (m,) of cells among their corners, and these.
+
+    degrees: (m, 3) of higher-order cells, weights: (n,) of rational ones; None where the file has none.
+    """
+
+    points: Array
+    types: IntArray
+    ends: IntArray
+    corners: IntArray
+    degrees: IntArray | None
+    weights: Array | None
+
+
+def grid_of(data: bytes, limit: int) -> tuple[str, list[GridPiece]]:
+    """Return the version of a .vtu's format, and its pieces with cells of any kind. Raises MeshError for a bad file.
+
+    limit: bytes that its arrays may unpack to.
+    """
+    root, decoder = _opened(data, limit, ".vtu", "UnstructuredGrid")
+    pieces = []
+    for piece in root.iter("Piece"):
+        n, m = (header_count(piece.get(name, "")) for name in ("NumberOfPoints", "NumberOfCells"))
+        if m:
+            given = {
+                part: _named(piece, *part)
+                for part in (("CellData", "HigherOrderDegrees"), ("PointData", "RationalWeights"))
+            }
+            degrees, weights = given.values()
+            pieces.append(
+                GridPiece(
+                    _places(piece, decoder, n),
+                    *_cells(piece, decoder, m),
+                    None if degrees is None else decoder.numbers(degrees, 3 * m).astype(np.int64).reshape(m, 3),
+                    None if weights is None else decoder.numbers(weights, n).astype(np.float64),
+                )
+            )
+    return root.get("version", ""), pieces
+
+
+def _cells(piece: ElementTree.Element, decoder: Decoder, count: int) -> tuple[IntArray, IntArray, IntArray]:
+    """Return types and ends (count,) of a piece's cells, and all their corners."""
+    types = decoder.numbers(_array(piece, "Cells", "types"), count).astype(np.int64)
+    ends = decoder.numbers(_array(piece, "Cells", "offsets"), count).astype(np.int64)
+    if np.diff(ends, prepend=0).min() < 0:
+        raise MeshError(f"the offsets of the .vtu's cells decrease; {DAMAGED}")
+    return types, ends, decoder.numbers(_array(piece, "Cells", "connectivity"), int(ends[-1])).astype(np.int64)
+
+
+def _named(piece: ElementTree.Element, part: str, name: str) -> ElementTree.Element | None:
+    return next((array for array in piece.iterfind(f"{part}/DataArray") if array.get("Name") == name), None)
 
 
 def _polygons(piece: ElementTree.Element, decoder: Decoder) -> Piece:
