@@ -98,6 +98,16 @@ def test_forces_at_nodes_have_the_resultant_of_the_solve():
     assert len(deck.lines) == 2 and deck.named["FIX_1"][0].size == 9
 
 
+def test_totals_gravity_and_moments_are_those_of_the_problem():
+    remote = {"nx > 0.9": ((0, 0, -500), (10, 0, 50))}
+    problem = iga_nn.Elasticity(density=2.0, gravity=(0, 0, -10), fix="nx < -0.9", total_force={"nx > 0.9": (0, 7, 0)})
+    assert np.allclose(Deck.of(bar(), problem).forces.sum(axis=0), [0, 7, -80], atol=1e-10)
+    deck = Deck.of(bar(), iga_nn.Elasticity(material="steel", fix="nx < -0.9", remote_force=remote))
+    moment = np.cross(deck.elements.points, deck.forces).sum(axis=0)
+    assert np.allclose(moment, np.cross((10, 0, 50), (0, 0, -500)), atol=1e-8)
+    assert deck.lines == [["*ELASTIC", "2.100000000000e+05, 3.000000000000e-01", "*DENSITY", "7.850000000000e-09"]]
+
+
 def test_supports_are_independent_equations_at_nodes():
     problem = iga_nn.Elasticity(
         fix={"nx < -0.9": (0, None, None)}, roller="ny < -0.9 or nz < -0.9", body_force=(1, 0, 0)
@@ -167,12 +177,13 @@ def test_ccx_agrees_with_the_solve_of_heat(tmp_path):
 
 REFUSED = [
     (iga_nn.Elasticity(fix="u0", spring={"u1": 3.0}, load={"v0": (0, 0, 1)}), "spring 'u1' is not written"),
+    (iga_nn.Elasticity(material="steel", temperature_change=9, fix="u0"), "temperature_change is not written"),
     (iga_nn.Poisson(kappa="1+x", conditions=[iga_nn.Value("u0", "1")]), "kappa varies on patch 0"),
     (iga_nn.Poisson(reaction="1", conditions=[iga_nn.Value("u0", "1")]), "reaction is not written"),
 ]
 
 
-@pytest.mark.parametrize(("problem", "message"), REFUSED, ids=["spring", "kappa", "reaction"])
+@pytest.mark.parametrize(("problem", "message"), REFUSED, ids=["spring", "temperature", "kappa", "reaction"])
 def test_what_is_not_written_is_refused_by_name(problem, message):
     with pytest.raises(InputError, match=message):
         Deck.of(benchmark_volume(2), problem)
