@@ -128,6 +128,8 @@ def assemble_body_data(patches: Sequence[Stated], options: SolveOptions, unknown
         for face in terms if conditions else ():
             _add_load(face, loads)
         known = _known(patches, loads.layout)
+        if patches[0].problem.form.has_initial_flux:
+            demand_uncoupled(patches[0].problem, "thermal strain goes without it: solve the whole body")
         couplings = couplings_of(patches, terms, loads.layout) if conditions else ()
     return Assembled(matrix.with_faces(terms, couplings), loads, known, conditions)
 

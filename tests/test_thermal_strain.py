@@ -101,3 +101,15 @@ def test_the_safety_is_the_yield_strength_over_the_stress():
     found = iga_nn.solve(bar(), iga_nn.Elasticity(material="steel", load={"u1": (47, 0, 0)}, roller=ROLLERS), degree=2)
     assert np.isclose(found.quantity("safety", [[0.5, 0.5, 0.5]])[0], 5.0)
     assert np.isclose(found.extremes("safety").least, 5.0, rtol=1e-6)
+
+
+def test_newton_finds_the_same_but_for_what_its_supports_give_way():
+    body = iga_nn.Elasticity(**STEEL, temperature_change=RISE, roller=("u0", "u1", "v0", "w0"))
+    stress = iga_nn.newton(bar(), body, degree=2).quantity("stress", [[0.5, 0.5, 0.5]])[0, 0, 0]
+    assert np.isclose(stress, -YOUNG * EXPANSION * RISE, rtol=1e-3)
+
+
+def test_thermal_strain_of_a_sector_is_refused():
+    body = iga_nn.Elasticity(**STEEL, temperature_change=RISE, roller="w0", conditions=[iga_nn.Cyclic("u0", "v0", "z")])
+    with pytest.raises(ValueError, match="thermal strain goes without it: solve the whole body"):
+        iga_nn.solve(bar(1.0), body, degree=2)

@@ -41,13 +41,11 @@ class StackForces:
         def add(piece: Piece) -> None:
             patches, _ = piece
             form, where = self.forms[patches[0]], (self.places[patches], self.stack.kinds[patches])
+            law = form.flux if form.linear else form.whole_flux  # the loads of a linear law have its initial flux
             for q, rows, size, fields, gradient, x in self._planes(piece, coefficients):
                 u, grad, scale = of_law(fields[:, :, 0]), of_law(gradient), np.sqrt(size)
                 with np.errstate(all="ignore"):  # a step may go too far: whoever makes it looks at the result
-                    flux = (
-                        of_patches(np.asarray(form.whole_flux(u, grad, x), dtype=np.float64), size)
-                        * scale[:, None, None]
-                    )
+                    flux = of_patches(np.asarray(law(u, grad, x), dtype=np.float64), size) * scale[:, None, None]
                     fields[:, :, 0] = of_patches(reaction(form, u, grad, x), size) * size[:, None]
                 group_kernels.turn_fields(rows, np.ascontiguousarray(flux), fields[:, :, 1:], True)
                 group_kernels.spread_splines(fields, *where, q, self.stack.tables, form.has_reaction, result)

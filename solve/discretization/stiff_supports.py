@@ -29,9 +29,9 @@ def on_stiff_supports(matrix: BodyMatrix, loads: OnPatches) -> tuple[BodyMatrix,
         if not isinstance(face, WeakFace) or not face.projector.any():
             stiff.append(face)
             continue
-        held = replace(face, form=Still(len(face.projector)), gamma=STIFF * face.gamma)
+        held = replace(face, form=Still(len(face.projector)), gamma=STIFF * face.gamma, initial=0.0 * face.initial)
         stiff.append(held)
-        if face.values.any():
+        if face.values.any() or face.initial.any():
             for one, sign in ((face, -1.0), (held, 1.0)):
                 found = np.zeros((len(face.patches), loads.components, *loads.layout.shapes[face.patches[0]]))
                 replace(one, loads=np.zeros_like(one.loads)).add_load(found)
