@@ -31,6 +31,7 @@ from .preparation import discretized
 from .rigid import rigid_motions
 from .system import System
 
+OF_SECTOR = "modes of a sector are those of nodal diameter zero, which turn with it: the whole body has others, too"
 DOUBTFUL = 1e-3  # share of an eigenvalue from which on an error of it is told
 FACTORED = 15_000  # most unknowns of a matrix that is factorized: of a cube matrix and factor take 0.5 GB
 
@@ -183,7 +184,8 @@ def modes(
     with one_blas_thread():
         found = pencil.lowest(n, tolerance, max_iterations)
     stiff = [TOO_STIFF] if law.form.caveat else []
-    notices = (*_notices(found), *bending_notices(system.patches), *stiff)
+    sector = [OF_SECTOR] if system.matrix.couplings else []
+    notices = (*_notices(found), *bending_notices(system.patches), *stiff, *sector)
     if found.worst > tolerance:
         remedy = "raise max_iterations or the tolerance, or ask for some more modes where several lie close together"
         raise ConvergenceError(

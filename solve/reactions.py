@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import chain
 from typing import Any
 
@@ -141,7 +141,9 @@ def balance(
         elif isinstance(face, FaceRule):
             own = own - _add_robin_faces(here, face, on_face, supports)
     for coupling in couplings:
-        parts = zip(coupling.forces(full), places, strict=True)
+        is_free = layout.joined(unknowns.spread(np.ones((problem.form.components, *unknowns.shape))))
+        tied = replace(residuals, flat=residuals.flat * is_free.flat)
+        parts = zip(tied if coupling.is_tied else coupling.forces(full), places, strict=True)
         supports[coupling.condition.role] = np.sum([added.of(part, place) for part, place in parts], axis=0)
     whole = total(own)
     reactions |= {role: total(force) for role, force in supports.items()}

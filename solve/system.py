@@ -31,6 +31,7 @@ from .discretization.processes import Processes, most_memory
 from .discretization.quadrature import GaussRule, operator_rule
 from .discretization.residual import Solved
 from .discretization.space import embedded, longest_edges
+from .discretization.tie import Tie, tie_of
 from .discretization.unknowns import Glued, Unknowns, Window
 from .field import BodyField, FieldOnBody, SplineField
 from .forms.boundary_value_problem import BoundaryValueProblem
@@ -99,6 +100,7 @@ class System:
     is_open: bool  # whether a constant is in the kernel of A
     right: Array  # b, (c, ...): of the free coefficients
     setup: float = 0.0  # process seconds
+    ties: Sequence[Tie] = ()  # of coefficients on two cuts
 
     formulation: ClassVar[str] = "displacement"  # of the unknowns
 
@@ -112,7 +114,13 @@ class System:
         return self._product(x, self.matrix)
 
     def _product(self, x: Array, matrix: BodyMatrix) -> Array:
-        return self.unknowns.collect(matrix.apply(self.unknowns.spread(x)))
+        return self._tied(self.unknowns.collect(matrix.apply(self.unknowns.spread(self._tied(x)))))
+
+    def _tied(self, x: Array) -> Array:
+        """Return the vector (c, ...) nearest to x that has u on one cut as on the other."""
+        for tie in self.ties:
+            x = tie(x)
+        return x
 
     @functools.cached_property
     def mass(self) -> LinearOperator:
@@ -185,7 +193,7 @@ class System:
 
     def precondition(self, residual: Array) -> Array:
         """Return the preconditioner times the free coefficients (c, ...)."""
-        return self.inverse(residual)
+        return self._tied(self.inverse(self._tied(residual))) if self.ties else self.inverse(residual)
 
     def _linear(self, apply: Callable[[Array], Array]) -> LinearOperator:
         def product(x: Array) -> Array:
@@ -414,8 +422,9 @@ class System:
         guess: where the iteration starts, (c, ...); by default at the start of the options.
         """
         limits = options.tolerance, options.max_iterations
+        guess = None if guess is None else self._tied(guess)
         if options.start is not None:
-            guess = self.vector(options.start).reshape(self.right.shape)
+            guess = self._tied(self.vector(options.start).reshape(self.right.shape))
         if options.device != "cpu":
             from .linear.cuda import solve_on_device
 
@@ -516,7 +525,13 @@ def system_of(
             f"{type(problem.form).__name__} without a reaction, and with Neumann data on all faces, does not "
             "determine the solution: give a value, or an exchange, on a face or a region"
         )
+    ties = [] if is_loose or len(matrix.couplings) > 1 else [tie_of(one, glued(unknowns)) for one in matrix.couplings]
+    held = [tie for tie in ties if tie is not None]
+    if held:
+        matrix = replace(matrix, couplings=[replace(one, is_tied=True) for one in matrix.couplings])
     right = unknowns.collect(loads - matrix.apply(known))
+    for tie in held:
+        right = tie(right)
     right = balanced(right, unknowns) if is_open and not is_loose else right
     inverse = preconditioner(
         body,
@@ -526,7 +541,7 @@ def system_of(
         lambda nodes: trilinear(nodes, matrix),
         is_loose,
     )
-    return System(body, problem, patches, systems, matrix, unknowns, inverse, is_open, right)
+    return System(body, problem, patches, systems, matrix, unknowns, inverse, is_open, right, ties=held)
 
 
 def is_diagonalized(unknowns: Unknowns, components: int) -> bool:

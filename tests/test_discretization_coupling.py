@@ -6,7 +6,6 @@ from bodies import exact_ring
 from rational_shapes import quarter_ring
 
 import iga_nn
-from parameterize.spline.body import Body
 from parameterize.spline.volume import BSplineVolume
 from solve.rigid import rigid_motions
 
@@ -21,35 +20,18 @@ def turning(*more, **how):
     return iga_nn.Elasticity(young=100.0, conditions=[*acting, *more], **how)
 
 
-def sector(first, second, spans=(2, 3)):
-    """A body of two patches: a quarter of a ring, divided along its middle into layers of different spans."""
-
-    def part(low, high, count):
-        def place(u, v, w):
-            angle, radius = 0.5 * np.pi * (low + (high - low) * u), 1.0 + v
-            return radius * np.cos(angle), radius * np.sin(angle), w
-
-        return BSplineVolume.from_function(place, (4, count + 2, count + 2), 2)
-
-    return Body.from_patches([part(0.0, 1.0, spans[0])]), first, second
-
-
-def test_a_sector_is_the_whole_ring():
-    cut = iga_nn.Cyclic(FIRST, SECOND)
-    errors = []
-    for refine in (0, 1):
-        whole = iga_nn.solve(exact_ring(), turning(), refine=refine, degree=3)
-        part = iga_nn.solve(quarter_ring(), turning(cut), refine=refine, degree=3)
-        assert part.report.converged and part.report.iterations < 2 * whole.report.iterations
-        wanted = whole.field.probe(PLACES)
-        errors.append(np.abs(part.field.probe(PLACES) - wanted).max() / np.abs(wanted).max())
-        balance = part.report.balance
-        assert balance.imbalance < 1e-8
-        np.testing.assert_allclose(balance.load[2], 0.25 * whole.report.balance.load[2])
-        np.testing.assert_allclose(balance.reactions[cut.role][2], 0.0, atol=1e-8)
-    assert errors[1] < 1e-3 and errors[1] < 0.25 * errors[0]
+def test_a_sector_with_equal_meshes_on_its_cuts_is_the_whole_ring_exactly():
+    cut, how = iga_nn.Cyclic(FIRST, SECOND), {"degree": 2, "quadrature": "gauss+1", "tolerance": 1e-12}
+    whole, part = iga_nn.solve(exact_ring(), turning(), **how), iga_nn.solve(quarter_ring(), turning(cut), **how)
+    assert part.report.converged and part.report.iterations < 2 * whole.report.iterations
+    wanted = whole.field.probe(PLACES)
+    np.testing.assert_allclose(part.field.probe(PLACES), wanted, atol=1e-8 * np.abs(wanted).max())
+    balance = part.report.balance
+    assert balance.imbalance < 1e-8
+    np.testing.assert_allclose(balance.load[2], 0.25 * whole.report.balance.load[2])
+    np.testing.assert_allclose(balance.reactions[cut.role][2], 0.0, atol=1e-8)
     share = part.report.estimate.l2_relative / whole.report.estimate.l2_relative
-    assert 0.5 < share < 2.0  # the cut adds little to the estimate
+    assert 0.3 < share < 2.0  # the cut adds little to the estimate
 
 
 def unlike(shift):
@@ -73,6 +55,16 @@ def test_meshes_that_do_not_match_give_the_rates_of_those_that_do():
     assert found[1] < found[0] / 9.0
 
 
+def test_a_sector_whose_cuts_have_other_meshes_has_the_reactions_of_the_ring():
+    cut = iga_nn.Cyclic(FIRST, SECOND)
+    part = iga_nn.solve(unlike(0.6), turning(cut), estimate=False)
+    free = iga_nn.solve(unlike(0.6), turning(), estimate=False)
+    assert part.report.converged and part.report.iterations <= 2 * free.report.iterations
+    found = part.report.balance
+    assert found.imbalance < 1e-8
+    np.testing.assert_allclose(found.reactions["fix 'nz < -0.99'"][2], -found.load[2], rtol=1e-6)
+
+
 def test_heat_is_equal_on_both_cuts():
     heated = iga_nn.Poisson(
         source="x*x + y*y", conditions=[iga_nn.Value("v0", 1.0), iga_nn.Flux("v1", "1"), iga_nn.Cyclic(FIRST, SECOND)]
@@ -93,7 +85,8 @@ def test_a_sector_keeps_the_motions_along_and_about_its_axis():
     sliding = iga_nn.Elasticity(young=100.0, conditions=[*loose.conditions, iga_nn.Roller("nz < -0.99")])
     with pytest.raises(ValueError, match=r"turns about x, y, z, .* is not held"):
         iga_nn.solve(quarter_ring(), sliding)
-    assert iga_nn.modes(quarter_ring(), loose, n=1, degree=2).rigid == 2
+    found = iga_nn.modes(quarter_ring(), loose, n=1, degree=2)
+    assert found.rigid == 2 and any("nodal diameter zero" in one for one in found.notices)
 
 
 @pytest.mark.parametrize(

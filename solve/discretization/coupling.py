@@ -53,7 +53,8 @@ class Coupling:
     integrals. gamma: (m,), Nitsche's parameter. distance: the largest one of an image from the region. jump: (c m,
     size), [u] of the coefficients of all patches, as `OnPatches.flat` has them; flux: the same of R t. patches: of the
     body. x, normal: (3, m), of the first region. first_faces, other_faces: the terms of conditions with points of the
-    two regions, and which points of theirs.
+    two regions, and which points of theirs. layout: of the coefficients. is_tied: whether the coefficients themselves
+    are coupled, so that there are no terms.
     """
 
     condition: Cyclic
@@ -72,10 +73,14 @@ class Coupling:
     normal: Array
     first_faces: Sequence[tuple[WeakFace, IntArray]]
     other_faces: Sequence[tuple[WeakFace, IntArray]]
+    layout: CoefficientLayout
+    is_tied: bool = False
 
     @cached_property
     def matrix(self) -> csr_array:
         """Return the matrix (size, size) of the terms."""
+        if self.is_tied:
+            return csr_array((self.jump.shape[1],) * 2)
         c = len(self.rotation)
         weights = diags_array(np.tile(self.weights, c))
         mixed = self.jump.T @ weights @ self.flux
@@ -208,6 +213,7 @@ def _coupling(
         x=x,
         normal=normal,
         first_faces=list(zip(ones, rows, strict=True)),
+        layout=layout,
         other_faces=[(face, np.flatnonzero(mask)) for face, mask in zip(others, masks, strict=True)],
     )
 
@@ -289,14 +295,14 @@ def _jump(
     rotation: Array, spaces: Sequence[TrialSpace], layout: CoefficientLayout, first: Located, second: Located
 ) -> csr_array:
     """Return the matrix (c m, size) from coefficients of all patches to u at second points minus R u at first ones."""
-    here, there = (_values(spaces, layout, points, len(rotation)) for points in (first, second))
+    here, there = (values_at(spaces, layout, points, len(rotation)) for points in (first, second))
     rows = [
         there[i] - sum(factor * own for factor, own in zip(row, here, strict=True)) for i, row in enumerate(rotation)
     ]
     return csr_array(vstack(rows))
 
 
-def _values(
+def values_at(
     spaces: Sequence[TrialSpace], layout: CoefficientLayout, points: Located, components: int
 ) -> list[csr_array]:
     """Return for each component the matrix (m, size) from coefficients of all patches to its values at points."""
