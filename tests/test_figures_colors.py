@@ -72,3 +72,4 @@ def test_stress_is_coloured_as_it_is_outside_of_singular_places(support):
         assert limits.high < limits.beyond == scene.high
         assert scene.shown[1] == limits.high == pytest.approx(1.0, abs=0.05)
         assert scene.said.startswith("99 % of the body away from singular places; largest")
+    assert not any(field.limits.without for field in fields_of(solution)[1:])  # displacements are finite everywhere

@@ -360,7 +360,8 @@ def _ranging(solution: FieldOnBody, field: ColoredField) -> ColoredField:
 
     The range knows the places of the largest and the least value, if these lie outside of it.
     """
-    places: SingularPlaces = getattr(solution, "singular", SingularPlaces())
+    none = SingularPlaces()
+    places: SingularPlaces = getattr(solution, "singular", none) if field.name == STRESS else none  # u is finite there
     body = solution.on_body
     lattices, counted = points_of(body).lattices, None
     for spans in RADII if len(places) else ():
