@@ -1,6 +1,8 @@
 """Reads the solid cells of .vtu files, and of .vtk and CGNS files by VTK: linear, quadratic, Lagrange, Bezier."""
 
 import re
+import subprocess
+import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
@@ -13,6 +15,8 @@ from parameterize.meshes.mesh import Block, VolumeMesh
 from parameterize.surface.readers.vtu import grid_of
 
 MAX_BYTES = 16 << 30  # that the arrays of a .vtu may unpack to
+# VTK's readers may end the program where a file is damaged: they try it in another one first.
+TRY = "import sys; from vtkmodules.{module} import {name}; r = {name}(); r.SetFileName(sys.argv[1]); r.Update()"
 DAMAGED = "VTK does not read it: the file is damaged, or no such file; export it again"
 READERS = {
     ".vtk": ("vtkIOLegacy", "vtkUnstructuredGridReader"),
@@ -139,6 +143,9 @@ def _read(path: Path) -> Any:
     from vtkmodules.vtkCommonCore import vtkLogger, vtkObject
 
     module, name = READERS[path.suffix.lower()]
+    tried = [sys.executable, "-c", TRY.format(module=module, name=name), str(path)]
+    if subprocess.run(tried, capture_output=True, check=False).returncode:
+        raise ValueError(DAMAGED)
     reader = getattr(import_module(f"vtkmodules.{module}"), name)()
     faults: list[str] = []
     reader.AddObserver("ErrorEvent", lambda *_: faults.append("error"))
