@@ -62,3 +62,12 @@ def test_the_least_bound_is_close():
     assert np.all(found.least[found.verdicts == FOLDED] < 0.0)
     some = certify_elements(SERENDIPITY, nodes[proved])
     assert some.lower.min() >= 0.9 * some.least.min()
+
+
+def test_a_least_value_that_no_corner_has_is_found():
+    """An edge that bulges into the element has det J = 1 at all corners, and 1 - .6 on a whole line."""
+    nodes = straight(SERENDIPITY)
+    nodes[np.flatnonzero((SERENDIPITY.lattice == (1, 0, 0)).all(axis=1))[0], 1] = 0.6
+    found = certify_elements(SERENDIPITY, nodes[None])
+    assert found.is_proved
+    assert found.lower[0] * found.volumes[0] == pytest.approx(0.4, abs=0.05)

@@ -77,8 +77,8 @@ Mesh = Annotated[str, Parameter(help="path of a closed surface, or the name of a
 Volume = Annotated[
     Path,
     Parameter(
-        help="volume.npz as `iga-nn run` writes it, a file of G+Smo (XML), MFEM, GeoPDEs or splinepy (JSON), or a mesh "
-        "of hexahedra or tetrahedra (.msh, .inp, .vtu, .vtk, Exodus)."
+        help="volume.npz as `iga-nn run` writes it, or its folder; a file of G+Smo (XML), MFEM, GeoPDEs or splinepy "
+        "(JSON); or a mesh of hexahedra or tetrahedra (.msh, .inp, .vtu, .vtk, Exodus)."
     ),
 ]
 VolumeOrRun = Annotated[

@@ -26,6 +26,13 @@ SHOWN = 3  # pairs of faces in a notice
 NARROWEST = 1e-100  # knot span: with the largest control points, derivatives stay within double precision
 
 
+def volume_file(given: str | Path) -> Path:
+    """Return the file of a volume that is named by itself, or by the output folder of a run that holds it."""
+    path = Path(given)
+    inside = path / "volume.npz"
+    return inside if path.is_dir() and inside.is_file() else path
+
+
 def load_volume(path: str | Path, tolerance: float = TOLERANCE) -> BodyLike:
     """Return the volume of a volume.npz, G+Smo XML, MFEM NURBS mesh, GeoPDEs geometry file or splinepy JSON.
 

@@ -28,7 +28,7 @@ from solve.forms.boundary_value_problem import BoundaryValueProblem
 from solve.study import with_rates
 
 from ..errors import InputError, input_errors
-from ..io.formats import load_volume
+from ..io.formats import load_volume, volume_file
 from ..level_table import Study, as_csv, as_table, rows_of
 from ..options import (
     NO_UNITS,
@@ -287,7 +287,7 @@ def solve_to(
     folder, the others return None. The other options and the errors are those of `run`.
     """
     check_type("volume", volume, str | Path)
-    problem_options, path = problem_options or PoissonOptions(), Path(volume)
+    problem_options, path = problem_options or PoissonOptions(), volume_file(volume)
     if comm is not None and device != "cpu":
         raise InputError(f"device {device!r}: --mpi runs on the CPU; leave one of them out")
     if comm is not None and problem_options.wanted is not None:
@@ -371,7 +371,7 @@ def study_to(
     and the errors are those of `run`.
     """
     check_type("volume", volume, str | Path)
-    study_options, path = study_options or StudyOptions(), Path(volume)
+    study_options, path = study_options or StudyOptions(), volume_file(volume)
     problem_options = problem_options or PoissonOptions()
     levels, is_known = (
         study_options.levels(),
@@ -439,7 +439,7 @@ def modes_to(
     The other options are those of `run`. Raises the errors of `run`, and ConvergenceError.
     """
     check_type("volume", volume, str | Path)
-    modes_options, path = modes_options or ModesOptions(), Path(volume)
+    modes_options, path = modes_options or ModesOptions(), volume_file(volume)
     body, _ = with_part(modes_options.problem(), SolveOptions(), path)
     asks, loaded = modes_options.asks(), load_volume(path)
     check_size(loaded, modes_options.refine, modes_options.degree, body.form.components)

@@ -33,8 +33,8 @@ class ElementsCertificate:
     lower : (n,) array
         Proved lower bounds of det J, divided by the magnitude of its mean on the element.
     scaled : (n,) array
-        Proved lower bounds of the scaled Jacobian, det J / (|F_u| |F_v| |F_w|); of tetrahedra times the square root of
-        2, and with the largest of the products that belong to their corners. It is at most 1.
+        Proved lower bounds of the scaled Jacobian: det J over the lengths of F_u, F_v, F_w; of tetrahedra times the
+        root of 2, and with the largest of the products that belong to their corners. It is at most 1.
     volumes : (n,) array
         Integrals of det J, the signed volumes.
     witnesses : (n, 3) array
@@ -141,8 +141,7 @@ class _Search:
         self._examine(np.flatnonzero(self.verdicts == UNDECIDED))
         self._settle_flat()
         if np.all(self.verdicts == POSITIVE) and len(self.verdicts):
-            known = float((self.least / self.means).min())
-            self.target = _TIGHT * known * self.means
+            self._aim()
             self._examine(np.flatnonzero(self.lower < self.target))
         root = np.sqrt(2.0) if self.form.is_simplex else 1.0
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -157,6 +156,10 @@ class _Search:
             self.witnesses,
             self.least / self.means,
         )
+
+    def _aim(self) -> None:
+        """Set the bounds that are tight enough, by the least value met on all elements."""
+        self.target = _TIGHT * float((self.least / self.means).min()) * self.means
 
     def _examine(self, numbers: IntArray) -> None:
         """Cut elements into parts until each is proved, folded or given up; their bounds become those of the parts."""
@@ -188,7 +191,8 @@ class _Search:
         corners = rows[:, self.form.corners]
         worst = corners.argmin(axis=1)
         value, place = corners[np.arange(len(corners)), worst], pieces.places[np.arange(len(corners)), worst]
-        self._record_least(owners, value, place)
+        if self._record_least(owners, value, place) and self.target.any():
+            self._aim()
         folded = (value < -errors) & (self.verdicts[owners] != INVERTED)
         self.verdicts[owners[folded]] = FOLDED
         hopeless = (value <= errors) & (least >= -errors)  # det J is 0 at a corner, and no fold can show
@@ -204,13 +208,14 @@ class _Search:
         np.minimum.at(self.lower, owners[done], bounds[done])
         return pieces.rows(~done)
 
-    def _record_least(self, owners: IntArray, value: Array, place: Array) -> None:
-        """Keep the least value met on each element, and where it is."""
+    def _record_least(self, owners: IntArray, value: Array, place: Array) -> bool:
+        """Keep the least value met on each element, and where it is; return whether one is smaller than before."""
         order = np.lexsort((value, owners))
         first = order[np.append(True, owners[order][1:] != owners[order][:-1])] if len(order) else order
         first = first[value[first] < self.least[owners[first]]]
         self.least[owners[first]] = value[first]
         self.witnesses[owners[first]] = place[first]
+        return bool(len(first))
 
     def _settle_flat(self) -> None:
         """Find det J without rounding where it seemed to be zero: there it is zero, or has a sign after all."""
