@@ -233,14 +233,14 @@ class Equilibrium:
             "residuals": tuple(history),
         }
         given |= said | {"notices": (*said.get("notices", ()), *given["notices"])}
-        field = self._with_state(field_of(self.body, patches, full))
+        field = self._with_state(field_of(self.body, patches, full), full)
         return Solution.of(field, [patch.problem for patch in patches], SolveReport(**given), problem)
 
-    def _with_state(self, field: BodyField) -> BodyField:
-        """Return a field with the internal variables of the law as splines on each patch."""
+    def _with_state(self, field: BodyField, full: OnPatches) -> BodyField:
+        """Return a field with what the law shows of its internal variables as splines on each patch."""
         if not self.forces.states:
             return field
-        each = zip(field.patches, self.forces.fitted(), strict=True)
+        each = zip(field.patches, self.forces.fitted(full), strict=True)
         states = [(one, None if own is None else np.moveaxis(own, 0, -1)) for one, own in each]
         return replace(field, patches=tuple(replace(one, state=state) for one, state in states))
 

@@ -85,10 +85,21 @@ class StackForces:
         self.stack.on_pieces(fill)
         return replace(self, state=state)
 
-    def fitted(self) -> Array:
-        """Return the coefficients (k, history, n_u, n_v, n_w) of splines that fit the internal variables best."""
+    def fitted(self, coefficients: Array) -> Array:
+        """Return the coefficients (k, history, n_u, n_v, n_w) of splines that fit what a law shows (`Form.shown`) best.
+
+        Coefficients of variables that must stay between those at the Gauss points do, and so do their splines.
+        """
         assert self.state is not None
-        found = np.moveaxis(self.state, 2, 1)  # (k, history, q_u, q_w, q_v)
+        state = np.empty_like(self.state)
+
+        def fill(piece: Piece) -> None:
+            patches, _ = piece
+            for q, _, size, _, gradient, x in self._planes(piece, coefficients):
+                state[patches, q] = of_patches(self.forms[patches[0]].shown(of_law(gradient), x), size)
+
+        self.stack.on_pieces(fill)
+        found = np.moveaxis(state, 2, 1)  # (k, history, q_u, q_w, q_v)
         parts = []
         for own, rule, space in zip(found, self.stack.rules, self.stack.spaces, strict=True):
             u, v, w = (
@@ -96,6 +107,8 @@ class StackForces:
                 for knots, degree, points in zip(space.knots, space.degrees, rule.points, strict=True)
             )
             parts.append(np.einsum("aq,hqrs,cr,bs->habc", u, own, w, v, optimize=True))
+            for i in self.forms[0].bounded:
+                np.clip(parts[-1][i], own[i].min(), own[i].max(), out=parts[-1][i])
         return np.stack(parts)
 
     def _planes(self, piece: Piece, source: Array) -> Iterator[tuple[int, Array, Array, Array, Array, Points]]:
@@ -149,12 +162,13 @@ class Forces:
         found.__dict__["of_faces"] = self.of_faces
         return found
 
-    def fitted(self) -> list[Array | None]:
-        """Return the coefficients (history, n_u, n_v, n_w) of the internal variables of each patch, None at rest."""
+    def fitted(self, coefficients: OnPatches) -> list[Array | None]:
+        """Return the coefficients (history, n_u, n_v, n_w) of what the law shows on each patch, None at rest."""
         found: list[Array | None] = [None] * len(self.forms)
+        groups = list(coefficients.in_groups)
         for own in self.stacks if self.states else ():
             numbers = [self.matrix.layout.groups[own.group][i] for i in own.places]
-            for number, fit in zip(numbers, own.fitted(), strict=True):
+            for number, fit in zip(numbers, own.fitted(groups[own.group]), strict=True):
                 found[number] = fit
         return found
 

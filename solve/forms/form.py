@@ -107,6 +107,18 @@ class Form:
         """Return the internal variables (history, ...) at the end of a load step with gradients (c, 3, ...)."""
         raise NotImplementedError(f"{type(self).__name__} has a history and must define advanced(self, grad, x)")
 
+    def shown(self, grad: Array, x: Any) -> Array:
+        """Return what solutions know in place of the history (history, ...) between Gauss points, as `x.state`.
+
+        By default it is the history. Splines are fitted to it, so that it should be smooth.
+        """
+        return np.asarray(x.state, dtype=np.float64)
+
+    @property
+    def bounded(self) -> Sequence[int]:
+        """Return which of the variables of `shown` must stay, on each patch, between those at its Gauss points."""
+        return ()
+
     @property
     def caveat(self) -> str:
         """Return why the law takes many iterations and has no error estimate from the residual; "" otherwise."""

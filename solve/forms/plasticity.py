@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -117,6 +117,44 @@ class Plasticity(NonlinearBody):
         strain = [before[i] + flow * direction[pair] for i, pair in enumerate(PAIRS)]
         return np.stack([*strain, before[6] + ROOT * flow])
 
+    def shown(self, grad: Array, x: Any) -> Array:
+        """Return the deviator of the elastic strain xx, xy, xz, yy, yz, zz and alpha (7, ...) at Gauss points.
+
+        The plastic strain is a thousand times as large, and errors of splines fitted to it would be stresses.
+        """
+        state = np.asarray(x.state, dtype=np.float64)
+        trial, _, _ = self._returned(grad, x)
+        return np.stack([*(trial[pair] / (2.0 * self.moduli[1]) for pair in PAIRS), state[6]])
+
+    @property
+    def bounded(self) -> Sequence[int]:
+        """Return the place of alpha: no more strength is shown than the Gauss points have."""
+        return (6,)
+
+    def shown_stress(self, u: Any, grad: Any, x: Any) -> Any:
+        """Return the stress (3, 3, ...) of a solution, whose von Mises stress is at most sigma_y + H alpha.
+
+        The deviator follows from what is known of the Gauss points (`shown`) and is taken back to the yield surface of
+        alpha; the mean stress follows from the displacement. Where nothing is known it is `flux`, that of a body that
+        has not flowed.
+        """
+        known = getattr(x, "state", None)
+        if known is None:
+            return self.flux(u, grad, x)
+        bulk, shear = self.moduli
+        limit: Any = self.yield_strength
+        hard: Any = self.hardening
+        deviator = 2.0 * shear * known[np.array(SYMMETRIC)]
+        third = (deviator[0, 0] + deviator[1, 1] + deviator[2, 2]) / 3.0
+        for i in range(3):
+            deviator[i, i] -= third
+        size = np.sqrt((deviator * deviator).sum(axis=(0, 1)))
+        most = ROOT * (limit + hard * np.maximum(known[6], 0.0))
+        stress = deviator * np.minimum(1.0, most / np.where(size > 0.0, size, most))
+        for i in range(3):
+            stress[i, i] += bulk * (grad[0, 0] + grad[1, 1] + grad[2, 2])
+        return stress
+
     def _returned(self, grad: Array, x: Any) -> tuple[Array, Array, Array]:
         """Return the trial deviator (3, 3, ...), the plastic flow (...), at least zero, and its direction."""
         shear = self.moduli[1]
@@ -140,12 +178,15 @@ class Plasticity(NonlinearBody):
     def quantities(self) -> Mapping[str, Quantity]:
         """Return the quantities of a solution by name; `plastic_strain` is alpha, the equivalent plastic strain (...).
 
-        The plastic strain is fitted to that of the Gauss points by splines on each patch.
+        Stresses are those of `shown_stress`. The plastic strain is fitted to that of the Gauss points by splines on
+        each patch, and nowhere exceeds it.
         """
         return {
             **super().quantities,
+            "flux": self.shown_stress,
+            "flux_magnitude": lambda u, grad, x: np.sqrt((self.shown_stress(u, grad, x) ** 2).sum(axis=(0, 1))),
             "strain": lambda u, grad, x: 0.5 * (grad + np.swapaxes(grad, 0, 1)),
-            **stress_quantities(self.flux),
+            **stress_quantities(self.shown_stress),
             "plastic_strain": lambda u, grad, x: np.maximum(_state(x, grad.shape[2:])[6], 0.0),
         }
 
