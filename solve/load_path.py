@@ -170,10 +170,7 @@ def _solution(path: _Path, why: str, seconds: dict[str, float]) -> Solution:
             f"interrupted: this is the solution under {factor:.4g} of the load, the last step in equilibrium"
         )
     elif why:
-        notices.append(
-            f"the body carries {factor:.4g} of the load: beyond no equilibrium is found, however small the step. It is "
-            "the limit load if it hardly changes with --steps and --refine"
-        )
+        notices.append(_why_not_all(factor, bool(balance.problem.form.history)))
     if (strain := path.steps[-1].plastic_strain or 0.0) > SMALL_STRAIN:
         notices.append(f"the plastic strain reaches {strain:.2g}, where the law for small strains no longer holds")
     way = balance.given_way(path.full, factor)
@@ -190,6 +187,20 @@ def _solution(path: _Path, why: str, seconds: dict[str, float]) -> Solution:
         balance=balance.balance(path.full, factor),
         seconds=seconds,
         notices=tuple(notices),
+    )
+
+
+def _why_not_all(factor: float, flows: bool) -> str:
+    """Return the notice on a load that is not carried in full: a limit load is known of bodies that flow alone."""
+    if flows:
+        return (
+            f"the body carries {factor:.4g} of the load: beyond no equilibrium is found, however small the step. It is "
+            "the limit load if it hardly changes with --steps and --refine"
+        )
+    return (
+        f"the iteration ends at {factor:.4g} of the load: beyond it finds no equilibrium, however small the step. "
+        "Either the body buckles or gives way there, or the iteration itself fails, as it does with a bulk modulus far "
+        "above the shear modulus: give K up to 1000 times that, and compare --steps, --refine and --degree"
     )
 
 

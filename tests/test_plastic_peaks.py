@@ -42,3 +42,10 @@ def test_a_body_that_does_not_yield_has_the_stress_of_its_strain():
     law = iga_nn.Plasticity(young=200.0, yield_strength=20.0, conditions=held)
     stress = iga_nn.solve(body, law, load_steps=1).quantity("stress", [[0.2, 0.9, 1.0]])[0]
     assert np.allclose(stress, np.diag([10.0, 0.0, 0.0]), atol=1e-6)
+
+
+def test_a_law_that_does_not_flow_has_no_limit_load():
+    from solve.load_path import _why_not_all
+
+    assert "limit load" in _why_not_all(0.8, True)
+    assert "limit" not in _why_not_all(0.4, False) and "K up to 1000 times" in _why_not_all(0.4, False)

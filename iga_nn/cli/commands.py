@@ -319,7 +319,7 @@ def write_sample(name: str, /, *, out: ObjFile = None, force: Overwrite = False)
 
 @app.command
 def materials() -> None:
-    """List the materials that --material knows, their numbers and where these stand."""
+    """List the materials that --material knows, their numbers and what these are quoted for."""
     from ..options.materials import listed
 
     _print(listed())

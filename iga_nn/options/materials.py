@@ -190,7 +190,7 @@ def axes_of(
 
 def listed() -> str:
     """Return the table of the library for a terminal."""
-    from solve.forms.library import MATERIALS
+    from solve.forms.library import MATERIALS, QUOTED
 
     rows: list[tuple[str, ...]] = [("", "E", "nu", "density", "alpha", "conductivity", "yield")]
     rows += [("", "MPa", "", "t/mm^3", "1/K", "W/(mm K)", "MPa")]
@@ -201,7 +201,7 @@ def listed() -> str:
     table = ["  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows]
     more = [f"{one.name}: G = {_number(one.shear_modulus)} MPa" for one in MATERIALS if not one.is_isotropic]
     sources = [f"{one.name}: {one.source}" for one in MATERIALS]
-    return "\n".join([*table, "", *more, "", "Sources", *sources])
+    return "\n".join([*table, "", *more, "", f"Sources: {QUOTED}", *sources])
 
 
 def _number(value: Any) -> str:

@@ -1,10 +1,12 @@
-"""Holds the library of materials: typical numbers at room temperature, each with its source.
+"""Holds the library of materials: numbers at room temperature, as they are commonly quoted for the sources named.
 
-Units are mm, N, MPa, t/mm^3, W/(mm K) and 1/K. A grade of one's own differs: its data sheet counts.
+They were not read from these sources. Units are mm, N, MPa, t/mm^3, W/(mm K) and 1/K. A grade of one's own differs: its
+data sheet counts.
 """
 
 from .material import Material, find
 
+QUOTED = "values as they are commonly quoted for these sources; check them for your grade before you rely on them"
 WOOD = "Wood Handbook, FPL-GTR-282 (2021), ch. 4 and 5, at 12 % moisture; axes along fibre, radius, tangent"
 WWFE = "Soden, Hinton, Kaddour, Compos. Sci. Technol. 58 (1998) 1011; axis 1 along the fibres"
 
@@ -61,7 +63,7 @@ MATERIALS = (
         expansion=8.6e-6,
         conductivity=0.0067,
         yield_strength=880.0,
-        source="Ti-6Al-4V annealed: ASM Metals Handbook, vol. 2",
+        source="Ti-6Al-4V annealed: ASM Metals Handbook, vol. 2; yield strengths from 830 MPa on are quoted",
         other_names=("Ti-6Al-4V", "titanium Ti-6Al-4V"),
     ),
     Material(
@@ -176,7 +178,7 @@ MATERIALS = (
         shear_modulus=(6600.0, 6600.0, 3930.0),
         density=1.58e-9,
         expansion=(-1e-6, 26e-6, 26e-6),
-        source=f"AS4/3501-6, unidirectional, 60 % fibres: {WWFE}",
+        source=f"AS4/3501-6, unidirectional, 60 % fibres: {WWFE}; E1 is quoted as 126 to 148 GPa, this is the least",
         other_names=("CFRP UD", "carbon fibre", "AS4/3501-6"),
     ),
     Material(
@@ -194,6 +196,8 @@ MATERIALS = (
 
 def material(name: str) -> Material:
     """Return a material of the library by its name, such as "steel", in mm, N, MPa and t/mm^3.
+
+    Its numbers are those commonly quoted for the source it names; check them for your grade before you rely on them.
 
     Parameters
     ----------

@@ -55,7 +55,7 @@ class Material:
     yield_strength : float, optional
         Yield strength, or the stress at 0.1 % or 0.2 % of plastic strain; None for a material that does not yield.
     source : str
-        Where the numbers stand.
+        What the numbers are quoted for.
     other_names : tuple of str
         Further names by which the library finds it.
     unit : str
