@@ -327,7 +327,11 @@ def _searched(
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def _holds(low: Array, high: Array, point: Array) -> bool:
-    return bool(np.all((low <= point) & (point <= high)))
+    """Return whether a point (3,) lies in the box from low to high (3,)."""
+    inside = True
+    for d in range(3):
+        inside = inside and low[d] <= point[d] <= high[d]
+    return inside
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
@@ -338,25 +342,18 @@ def _halve(point: Array, stack: Array, boxes: Array, levels: IntArray, top: int,
     """
     axis, widest = 0, -1.0
     for d in range(3):
-        ahead, behind = _layer(stack[top], d, stack.shape[1 + d] - 1), _layer(stack[top], d, 0)
-        width = _farthest(ahead, behind)
+        width = _width(stack[top], d)
         if width > widest:
             axis, widest = d, width
     right = stack[top].copy()
     left = right.copy()
-    n = right.shape[axis]
-    for r in range(1, n):
-        for j in range(n - r):
-            _layer(right, axis, j)[:] = 0.5 * (_layer(right, axis, j) + _layer(right, axis, j + 1))
-        _layer(left, axis, r)[:] = _layer(right, axis, 0)
+    _cut(right, left, axis)
     box, level, size = boxes[top].copy(), levels[top] + 1, top
     middle = 0.5 * (box[0, axis] + box[1, axis])
+    low, high = np.empty(3), np.empty(3)
     for side in range(2):
         net = right if side else left
-        low, high = np.empty(3), np.empty(3)
-        for d in range(3):
-            along = net[..., d] if net.shape[3] == 3 else net[..., d] / net[..., 3]
-            low[d], high[d] = along.min() - margin, along.max() + margin
+        _enclose(net, margin, low, high)
         if _holds(low, high, point):
             stack[size], boxes[size], levels[size] = net, box, level
             boxes[size, 1 - side, axis] = middle
@@ -365,24 +362,55 @@ def _halve(point: Array, stack: Array, boxes: Array, levels: IntArray, top: int,
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def _farthest(one: Array, other: Array) -> float:
-    """Return the largest difference of a coordinate of two layers (n, m, 3) of control points, or (n, m, 4)."""
-    if one.shape[2] == 3:
-        return float(np.abs(one - other).max())
-    farthest = 0.0
-    for d in range(3):
-        farthest = max(farthest, np.abs(one[..., d] / one[..., 3] - other[..., d] / other[..., 3]).max())
-    return farthest
+def _place(net: Array, i: int, j: int, k: int, d: int) -> float:
+    """Return a coordinate of a control point of a net (n, m, l, 3), or homogeneous (n, m, l, 4)."""
+    return float(net[i, j, k, d] if net.shape[3] == 3 else net[i, j, k, d] / net[i, j, k, 3])
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def _layer(net: Array, axis: int, j: int) -> Array:
-    """Return the control points of layer j along an axis, as a view."""
-    if axis == 0:
-        return net[j, :, :]
-    if axis == 1:
-        return net[:, j, :]
-    return net[:, :, j]
+def _width(net: Array, axis: int) -> float:
+    """Return the largest difference of a coordinate of the first and the last layer of control points along an axis."""
+    n, m, o = net.shape[0], net.shape[1], net.shape[2]
+    widest = 0.0
+    for i in range(1 if axis == 0 else n):
+        for j in range(1 if axis == 1 else m):
+            for k in range(1 if axis == 2 else o):
+                last = n - 1 if axis == 0 else i, m - 1 if axis == 1 else j, o - 1 if axis == 2 else k
+                for d in range(3):
+                    apart = abs(_place(net, last[0], last[1], last[2], d) - _place(net, i, j, k, d))
+                    widest = max(widest, apart)
+    return widest
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _cut(right: Array, left: Array, axis: int) -> None:
+    """Turn two copies of a net of control points into those of its halves along an axis, by de Casteljau."""
+    n, m, o, c = right.shape
+    degree = right.shape[axis] - 1
+    di, dj, dk = int(axis == 0), int(axis == 1), int(axis == 2)
+    for r in range(1, degree + 1):
+        for i in range(n - r * di):
+            for j in range(m - r * dj):
+                for k in range(o - r * dk):
+                    for d in range(c):
+                        right[i, j, k, d] = 0.5 * (right[i, j, k, d] + right[i + di, j + dj, k + dk, d])
+        for i in range(1 if di else n):
+            for j in range(1 if dj else m):
+                for k in range(1 if dk else o):
+                    for d in range(c):
+                        left[i + r * di, j + r * dj, k + r * dk, d] = right[i, j, k, d]
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _enclose(net: Array, margin: float, low: Array, high: Array) -> None:
+    """Write the box of control points, wider by a margin, into low and high (3,)."""
+    low[:], high[:] = np.inf, -np.inf
+    for i in range(net.shape[0]):
+        for j in range(net.shape[1]):
+            for k in range(net.shape[2]):
+                for d in range(3):
+                    place = _place(net, i, j, k, d)
+                    low[d], high[d] = min(low[d], place - margin), max(high[d], place + margin)
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
@@ -397,46 +425,61 @@ def _newton(
     found: Array,
 ) -> bool:
     """Solve F(u, v, w) = x from `begin` in the cube; write the parameters into `found` where that succeeds."""
-    where, trial = begin.copy(), begin.copy()
+    where, trial, rest, step = begin.copy(), begin.copy(), np.empty(3), np.empty(3)
     value, jacobian = np.empty(3), np.empty((3, 3))
     _evaluate(where, knots, degrees, control, basis, value, jacobian)
-    rest = point - value
-    off = np.sqrt((rest**2).sum())
+    off = _distance(point, value)
     for _ in range(_STEPS):
         if off <= _EXACT * diagonal:
             break
-        step = _solved(jacobian, rest)
-        share, closer = 1.0, False
+        for d in range(3):
+            rest[d] = point[d] - value[d]
+        _solve(jacobian, rest, step)
+        share, closer, now = 1.0, False, off
         for _ in range(_HALVINGS):
             for d in range(3):
                 trial[d] = min(max(where[d] + share * step[d], 0.0), 1.0)
             _evaluate(trial, knots, degrees, control, basis, value, jacobian)
-            now = np.sqrt(((point - value) ** 2).sum())
+            now = _distance(point, value)
             closer = now < off
             if closer:
                 break
             share *= 0.5
         if not closer:
             break
-        where[:], off = trial, now
-        rest = point - value
+        off = now
+        for d in range(3):
+            where[d] = trial[d]
     if off > CLOSE * diagonal:
         return False
-    found[:] = where
+    for d in range(3):
+        found[d] = where[d]
     return True
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def _solved(matrix: Array, right: Array) -> Array:
-    """Return the solution (3,) by Cramer's rule; zero for a singular matrix."""
-    a, b, c = matrix[:, 0], matrix[:, 1], matrix[:, 2]
-    bc, ca, ab = np.cross(b, c), np.cross(c, a), np.cross(a, b)
-    det = (a * bc).sum()
-    solution = np.zeros(3)
-    if det != 0.0:
-        solution[0], solution[1], solution[2] = (right * bc).sum(), (right * ca).sum(), (right * ab).sum()
-        solution /= det
-    return solution
+def _distance(one: Array, other: Array) -> float:
+    """Return the distance of two points (3,)."""
+    return float(np.sqrt((one[0] - other[0]) ** 2 + (one[1] - other[1]) ** 2 + (one[2] - other[2]) ** 2))
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _solve(matrix: Array, right: Array, solution: Array) -> None:
+    """Write the solution (3,) of a system (3, 3) by Cramer's rule; zero for a singular matrix."""
+    solution[:] = 0.0
+    det = 0.0
+    for d in range(3):
+        i, j = (d + 1) % 3, (d + 2) % 3
+        minor = matrix[1, i] * matrix[2, j] - matrix[2, i] * matrix[1, j]
+        det += matrix[0, d] * minor
+    if det == 0.0:
+        return
+    for d in range(3):
+        i, j = (d + 1) % 3, (d + 2) % 3
+        first = matrix[1, i] * matrix[2, j] - matrix[2, i] * matrix[1, j]
+        second = matrix[2, i] * matrix[0, j] - matrix[0, i] * matrix[2, j]
+        third = matrix[0, i] * matrix[1, j] - matrix[1, i] * matrix[0, j]
+        solution[d] = (right[0] * first + right[1] * second + right[2] * third) / det
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
