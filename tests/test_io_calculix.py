@@ -189,7 +189,7 @@ def test_what_is_not_written_is_refused_by_name(problem, message):
         Deck.of(benchmark_volume(2), problem)
 
 
-def test_a_run_is_exported_with_its_problem(tmp_path, monkeypatch, capsys):
+def test_a_run_is_exported_with_its_problem(tmp_path, monkeypatch, capsys, caplog):
     monkeypatch.chdir(tmp_path)
     benchmark_volume(2).save("volume.npz")
     solve = ["solve", "elasticity", "volume.npz", "--refine", "0", "--out", "pulled"]
@@ -201,6 +201,9 @@ def test_a_run_is_exported_with_its_problem(tmp_path, monkeypatch, capsys):
     assert Path("pulled_u.xml").is_file()
     assert main(["export", "pulled", "--to", "calculix", "--element", "C3D10", "--force"]) == 2
     assert "choose one of C3D20, C3D20R, C3D8" in capsys.readouterr().err
+    assert main(["export", "volume.npz", "--to", "calculix"]) == 0
+    assert "no solution with a known problem: the file has mesh and sets" in caplog.text
+    assert "*STEP" not in Path("volume.inp").read_text()
     Path("empty").mkdir()
     assert main(["export", "empty", "--to", "calculix"]) == 2
     assert "is a folder: name the volume.npz in it" in capsys.readouterr().err

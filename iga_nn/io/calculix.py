@@ -226,6 +226,8 @@ def write_calculix(
     element: str = "C3D20",
 ) -> Deck:
     """Write an input file, and return what it says. Raises as `Deck.of`, and OSError."""
+    if problem is None:
+        log.warning("no solution with a known problem: the file has mesh and sets, but no materials and no step")
     deck = Deck.of(body, problem, part, parts=parts, element=element)
     path.write_text("\n".join(deck.text()) + "\n", encoding="utf-8")
     return deck

@@ -21,6 +21,7 @@ from solve.forms.boundary_value_problem import BoundaryValueProblem
 from solve.forms.conditions import Value
 from solve.patch_system import PatchProblem
 
+from .cell_regions import regions_at
 from .elements import Elements, alike_patches
 
 INWARD = 0.02  # share of the way from a node to the middle of its face, where a region is asked whether it holds
@@ -201,18 +202,8 @@ def faces_of_regions(
         middle = 0.5 * (across.min(axis=1, keepdims=True) + across.max(axis=1, keepdims=True))
         x, normal, owners = faces.seen(middle)
         own = elements.own_face(faces.elements, np.full(len(faces.elements), faces.face))
-        name = FACE_NAMES[faces.face]
-        is_single = elements.body.is_single
-        names = [name if is_single else f"p{number}_{name}" for number in faces.faces.group.numbers.tolist()]
-        conditions = () if problem is None else problem.conditions
-        codes = None if problem is None else codes_on(problem, faces.faces.nets, names)(x, normal, owners)
-        for i, condition in enumerate(conditions, 1):
-            here = codes >> i & 1 == 1  # type: ignore[operator]
-            found[f"{condition.kind}_{i}"].append((faces.elements[here], own[here]))
-        if part is not None and part.groups:
-            nearest = part.nearest(x.T, normal.T)
-            for group, triangles in part.groups.items():
-                here = np.isin(nearest, triangles)
-                found[group].append((faces.elements[here], own[here]))
+        face, is_single = FACE_NAMES[faces.face], elements.body.is_single
+        for name, here in regions_at(faces.faces, face, (x, normal), owners, is_single, problem, part):
+            found[name].append((faces.elements[here], own[here]))
     joined = {name: tuple(map(np.concatenate, zip(*parts, strict=True))) for name, parts in found.items()}
     return {name: (rows[0], rows[1]) for name, rows in joined.items() if len(rows[0])}

@@ -54,7 +54,7 @@ class Format:
 
 
 def _view(path: Path, given: Exported) -> None:
-    view.write_view(path, given.body, given.solution, given.problem, given.samples, given.quantities)
+    view.write_view(path, given.body, given.solution, given.problem, given.samples, given.quantities, given.part)
 
 
 def _calculix(path: Path, given: Exported) -> None:
@@ -82,7 +82,9 @@ FORMATS = {
         mfem.read_mfem,
     ),
     "geopdes": Format(".txt", read=geopdes.read_geopdes),
-    "vtk": Format("_bezier.vtu", lambda path, given: vtk.write_bezier(path, given.body, given.solution)),
+    "vtk": Format(
+        "_bezier.vtu", lambda path, given: vtk.write_bezier(path, given.body, given.solution, given.problem, given.part)
+    ),
     "view": Format("_view.vtu", _view, takes=("samples", "quantity")),
     "json": Format(
         ".json",

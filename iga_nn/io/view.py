@@ -26,6 +26,7 @@ from parameterize.spline.body import BodyLike, as_body
 from parameterize.spline.bspline import divided_spans
 from parameterize.spline.orientation import orientations
 from parameterize.spline.spline_stack import SplineStack
+from parameterize.surface.part import PartSurface
 from solve.field import FieldOnBody
 from solve.field_groups import FieldGroup, groups_of
 from solve.forms.boundary_value_problem import BoundaryValueProblem
@@ -35,6 +36,8 @@ from solve.solution import Solution
 
 from ..errors import InputError, one_line
 from ..figures.fields import OnGrid, arap_of, error_at, known_groups, problems_on
+from .cell_regions import enter_regions
+from .elements import Cuts
 from .vtk import bezier_cells, enter_owners, save
 
 if TYPE_CHECKING:
@@ -60,12 +63,16 @@ def write_view(
     problem: BoundaryValueProblem | None = None,
     samples: int | None = None,
     quantities: Quantities | None = None,
+    part: PartSurface | None = None,
 ) -> None:
     """Write samples of the map, the solution and, where its problem is known, the error and quantities of its law.
 
-    samples: cells a span and direction, chosen by default. Raises InputError for quantities that are not known.
+    samples: cells a span and direction, chosen by default. The regions of the problem and the groups of a part are cell
+    data, as in `io.vtk`. Raises InputError for quantities that are not known.
     """
-    save(path, _viewed(body, solution, problem, samples, quantities))
+    seen, cuts = _viewed(body, solution, problem, samples, quantities)
+    enter_regions(seen, as_body(body), list(cuts), [cuts[number] for number in sorted(cuts)], problem, part)
+    save(path, seen)
 
 
 def write_solution(path: Path, solution: Solution) -> int:
@@ -96,7 +103,7 @@ def grid(
         return bezier_cells(body, solution)
     if samples < 1:
         raise ValueError(f"samples {samples}: must be 1 or larger, or None for exact Bezier cells")
-    return _viewed(body, solution, problem, samples, quantities)
+    return _viewed(body, solution, problem, samples, quantities)[0]
 
 
 def _viewed(
@@ -105,15 +112,21 @@ def _viewed(
     problem: BoundaryValueProblem | None,
     samples: int | None,
     quantities: Quantities | None,
-) -> pyvista.UnstructuredGrid:
-    """Return linear cells, `samples` a span and direction or as many as fit, with the values of map and solution."""
+) -> tuple[pyvista.UnstructuredGrid, dict[int, Cuts]]:
+    """Return linear cells, `samples` a span and direction or as many as fit, with the values of map and solution.
+
+    With them come the ends of the cells of each patch, in the order of the cells.
+    """
+    cuts: dict[int, Cuts] = {}
     lattices, most = [], MOST_VIEWED // len(as_body(body))
     for part in _parts(body, solution, problem):
         rows = (
             _fitting(part.breaks, most)[0] if samples is None else [divided_spans(row, samples) for row in part.breaks]
         )
+        u, v, w = rows
+        cuts |= dict.fromkeys(part.numbers.tolist(), (u, v, w))
         lattices.append(_sampled(part, rows, _of_map(part, rows) | _of(part, rows, quantities)))
-    return _joined(body, lattices)
+    return _joined(body, lattices), cuts
 
 
 def write_series(path: Path, times: Sequence[float], fields: Sequence[FieldOnBody], samples: int | None = None) -> None:

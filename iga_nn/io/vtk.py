@@ -12,7 +12,8 @@ w reversed.
 The patches of a body are in one grid, not a block each: neighbours share the points of an interface where they have the
 same weights there, so that the surface is the body's and fields run on through it. The cell data `patch` is the number
 of a cell's patch, and `solid`, of a body of several solids, that of its solid: ParaView selects (Threshold) or colours
-by them.
+by them. So it does by the regions of conditions, such as `fix_1`, and by the groups of the part: 1 for cells with a
+face there, else 0.
 
 VTK's slices, clips and contours take the Bernstein coefficients of such cells for values and are wrong; surfaces and
 tessellations are right. For slicing and clipping there are the samples of `io.view`.
@@ -44,7 +45,12 @@ from parameterize.spline.interface import WEIGHT_TOLERANCE, Interface, face_laye
 from parameterize.spline.orientation import hands_of
 from parameterize.spline.rational import projected
 from parameterize.spline.volume import BSplineVolume
+from parameterize.surface.part import PartSurface
 from solve.field import FieldOnBody, SplineField
+from solve.forms.boundary_value_problem import BoundaryValueProblem
+
+from .cell_regions import enter_regions
+from .elements import Cuts
 
 if TYPE_CHECKING:
     import pyvista
@@ -56,10 +62,16 @@ def write_bezier(
     path: Path,
     body: BodyLike,
     solution: FieldOnBody | None = None,
-    *_: object,
+    problem: BoundaryValueProblem | None = None,
+    part: PartSurface | None = None,
 ) -> None:
-    """Write the exact cells; a solution becomes the point data `u`."""
-    save(path, bezier_cells(body, solution))
+    """Write the exact cells; a solution becomes the point data `u`, the regions of a problem cell data."""
+    whole = as_body(body)
+    grid = bezier_cells(whole, solution)
+    fields = (None,) * len(whole) if solution is None else solution.patches
+    cuts = [breaks_of(*one) for one in zip(whole, fields, strict=True)]
+    enter_regions(grid, whole, range(len(whole)), cuts, problem, part)
+    save(path, grid)
 
 
 @dataclass(frozen=True)
@@ -157,10 +169,11 @@ def _weighted(solution: SplineField, volume: BSplineVolume, breaks: Sequence[Arr
     return interpolate_grid(knots, degree, solution.grid(u, v, w).reshape(*weight.shape[:3], -1) * weight)
 
 
-def breaks_of(volume: BSplineVolume, solution: SplineField | None) -> list[Array]:
+def breaks_of(volume: BSplineVolume, solution: SplineField | None) -> Cuts:
     """Return the ends of the spans of the solution and its volume, in each direction."""
     shown: list[BSplineVolume | SplineField] = [volume] if solution is None else [volume, solution]
-    return [np.unique(np.concatenate([spline.knots[a] for spline in shown])) for a in range(3)]
+    u, v, w = (np.unique(np.concatenate([spline.knots[a] for spline in shown])) for a in range(3))
+    return u, v, w
 
 
 def _bernstein(
