@@ -1,10 +1,15 @@
 """Tests the options of materials: names, units, axes, and options that do nothing."""
 
+import pickle
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 import iga_nn
+from iga_nn import ElasticityOptions, PlasticOptions
+from iga_nn.errors import InputError
+from iga_nn.live.page_form import filled, stated
 from iga_nn.options.analysis import ModesOptions
 from iga_nn.options.materials import listed
 from solve.forms.library import MATERIALS
@@ -100,3 +105,20 @@ def test_the_page_has_the_numbers_of_the_library():
 
 def _shown(value):
     return "; ".join(f"{part:.5g}" for part in value) if isinstance(value, tuple) else f"{value:.5g}"
+
+
+@pytest.mark.parametrize("kind", [ElasticityOptions, PlasticOptions, ModesOptions])
+def test_a_number_given_beside_a_material_is_refused_even_if_it_is_the_default(kind):
+    with pytest.raises(InputError, match="--material and --young: give one of them"):
+        kind(material="steel", young=1.0, **({} if kind is ModesOptions else LOADED)).problem()
+    with pytest.raises(InputError, match="--material and --poisson-ratio: give one of them"):
+        kind(material="steel", poisson_ratio=0.3, **({} if kind is ModesOptions else LOADED)).problem()
+    assert kind().young == 1.0 and replace(pickle.loads(pickle.dumps(kind())), material="steel").young == 1.0
+
+
+def test_a_form_with_a_material_has_empty_constants():
+    sheet = {"problem": "elasticity", "material": "steel", "fix": "u0", "load": "u1=0;0;1"}
+    found = stated(sheet, ElasticityOptions(fix=("u0",)))
+    assert found.material == "steel" and "young" not in filled(found)
+    with pytest.raises(InputError, match="--material and --young"):
+        stated(sheet | {"young": "1"}, ElasticityOptions())

@@ -10,6 +10,7 @@ from parameterize.spline.volume import FACE_NAMES
 from ..errors import InputError
 from ..figures.colors import FACE_COLORS, face_labels
 from ..options import PROBLEMS, PoissonOptions, ProblemOptions
+from ..options.materials import Unstated
 
 _OPTION = re.compile(r"^ {8}(\w+): (.*(?:\n {12}.*)*)", re.MULTILINE)  # of the docstring of options
 UNIT = ("unit", "Unit of lengths, such as mm", "none")  # of every problem, as ASK
@@ -89,7 +90,7 @@ def stated(form: Mapping[str, Any], problem_options: ProblemOptions, *, has_face
     for field, title, empty in (*kind.sheet.fields, UNIT):
         given[field] = _text(form, field) or None
         if isinstance(getattr(kind, field), float):
-            given[field] = _number(title, empty, given[field])
+            given[field] = _number(title, empty, text) if (text := given[field]) else getattr(kind, field)
     for field in (*kind.on_regions(), ASK[0]):
         given[field] = tuple(filter(None, map(str.strip, _text(form, field).splitlines())))
     if has_faces and "robin" in kind.on_faces:
@@ -113,10 +114,10 @@ def _base(name: str, problem_options: ProblemOptions) -> ProblemOptions:
     return PROBLEMS[name](**shared)
 
 
-def _number(title: str, empty: str, text: str | None) -> float:
-    """Return the number that a field has, or that holds where it is empty. Raises InputError."""
+def _number(title: str, empty: str, text: str) -> float:
+    """Return the number that a field has. Raises InputError."""
     try:
-        return float(text or empty)
+        return float(text)
     except ValueError:
         raise InputError(f"{title}: give a number, such as {empty}, got {text!r:.80}") from None
 
@@ -141,7 +142,11 @@ def filled(problem_options: ProblemOptions) -> dict[str, str]:
     """Return the form that states these options, as `stated` reads it; options that are not given are left out."""
     form = {"problem": problem_options.section}
     known = ((name, getattr(problem_options, name)) for name, _, _ in (*problem_options.sheet.fields, UNIT))
-    form |= {name: f"{value:.12g}" if isinstance(value, float) else value for name, value in known if value}
+    form |= {
+        name: f"{value:.12g}" if isinstance(value, float) else value
+        for name, value in known
+        if value and not isinstance(value, Unstated)
+    }
     form |= {
         name: "\n".join(lines)
         for name in (*problem_options.on_regions(), ASK[0])
@@ -161,6 +166,9 @@ def filled(problem_options: ProblemOptions) -> dict[str, str]:
 def in_words(problem_options: ProblemOptions) -> str:
     """Return the data of a problem in one line, which distinguishes jobs."""
     form, sheet = filled(problem_options), problem_options.sheet
+    if not form.get("material"):
+        values = ((name, getattr(problem_options, name)) for name in sheet.signs)
+        form |= {name: f"{value:g}" for name, value in values if isinstance(value, Unstated)}
     said = [] if problem_options.section == "poisson" else [sheet.title]
     said += [f"{sign} = {form[name]}" for name, sign in sheet.signs.items() if name in form]
     for face in FACE_NAMES:

@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Any, Literal
 from ..errors import InputError, input_errors
 from ..type_check import Checked
 from . import texts
-from .materials import axes_of, materials_of, of_all
+from .materials import POISSON_RATIO, YOUNG, axes_of, demand_unstated, materials_of, of_all
 from .space_check import check_level, check_space
 
 if TYPE_CHECKING:
     from solve import Ask, Elasticity, Material
 
-MODULI = {"young": 1.0, "poisson_ratio": 0.3}  # in whose place a material stands, and their defaults
+MODULI = ("young", "poisson_ratio")  # in whose place a material stands
 
 
 @dataclass(frozen=True)
@@ -65,8 +65,8 @@ class ModesOptions(Checked):
         ask: frequencies to answer with intervals, each as "frequency 1".
     """
 
-    young: float | str = 1.0
-    poisson_ratio: float | str = 0.3
+    young: float | str = YOUNG
+    poisson_ratio: float | str = POISSON_RATIO
     density: float | str | None = None
     material: str | None = None
     unit: Literal["mm", "m"] | None = None
@@ -108,8 +108,7 @@ class ModesOptions(Checked):
             if self.first_axis or self.second_axis or self.unit:
                 raise InputError("--first-axis, --second-axis and --unit belong to --material: give it, too")
             return {name: texts.numbers(f"--{name.replace('_', '-')}", getattr(self, name)) for name in MODULI}
-        if any(getattr(self, name) != default for name, default in MODULI.items()):
-            raise InputError("--material and --young or --poisson-ratio: give one of them, the material has its own")
+        demand_unstated(self, MODULI)
         axes = axes_of(self.first_axis, self.second_axis, self.materials().values())
         return {"material": of_all(self.materials()), **axes}
 

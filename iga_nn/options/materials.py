@@ -21,14 +21,23 @@ if TYPE_CHECKING:
 MEGAPASCAL = ("MPa", "N/mm²", "N/mm^2", "N/mm2")
 PASCAL = ("Pa", "N/m²", "N/m^2", "N/m2")
 SYSTEMS = {"mm": MEGAPASCAL, "m": PASCAL}  # unit of lengths -> units of stresses that agree with it
-OWN = {  # options in whose place a material stands, and their values where they are not given
-    "young": 1.0,
-    "poisson_ratio": 0.3,
-    "shear_modulus": None,
-    "alpha": None,
-    "yield_strength": None,
-}
+OWN = ("young", "poisson_ratio", "shear_modulus", "alpha", "yield_strength")  # in whose place a material stands
 PARAMETERS = ("u", "v", "w")
+
+
+class Unstated(float):
+    """Hold the number of an option that is not given; the same number, given, is another object."""
+
+
+YOUNG, POISSON_RATIO = Unstated(1.0), Unstated(0.3)
+
+
+def demand_unstated(options: Any, names: Iterable[str]) -> None:
+    """Raise InputError for an option that is given beside a material, in whose place the material stands."""
+    for name in names:
+        value = getattr(options, name)
+        if value is not None and not isinstance(value, Unstated):
+            raise InputError(f"--material and --{_flag(name)}: give one of them, the material has its own")
 
 
 @dataclass(frozen=True)
@@ -56,8 +65,8 @@ class MaterialOptions(BodyOptions, ABC):
     """
 
     material: str | None = None
-    young: float | str = 1.0
-    poisson_ratio: float | str = 0.3
+    young: float | str = YOUNG
+    poisson_ratio: float | str = POISSON_RATIO
     shear_modulus: str | None = None
     first_axis: Formula | None = None
     second_axis: Formula | None = None
@@ -77,9 +86,7 @@ class MaterialOptions(BodyOptions, ABC):
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.material is not None:
-            for name, default in OWN.items():
-                if getattr(self, name) != default:
-                    raise InputError(f"--material and --{_flag(name)}: give one of them, the material has its own")
+            demand_unstated(self, OWN)
             self.materials()
         elif self.temperature_change is not None and self.alpha is None:
             raise InputError(

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 from ..errors import InputError
 from .load_steps import LoadStepOptions
-from .materials import MaterialOptions, materials_of, of_all
+from .materials import POISSON_RATIO, YOUNG, MaterialOptions, Unstated, demand_unstated, materials_of, of_all
 from .problem import Formula, Row, Sheet, Units  # noqa: F401  # Formula is in the annotations of the base class
 from .texts import numbers
 
@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from solve.forms.plasticity import Plasticity
 
 OF_LIBRARY = ("young", "poisson_ratio", "yield_strength")
+YIELD_STRENGTH = Unstated(1.0)
 GIVEN = (*OF_LIBRARY, "hardening")
 
 
@@ -42,9 +43,9 @@ class PlasticOptions(LoadStepOptions):
     """
 
     material: str | None = None
-    young: float | str = 1.0
-    poisson_ratio: float | str = 0.3
-    yield_strength: float | str = 1.0
+    young: float | str = YOUNG
+    poisson_ratio: float | str = POISSON_RATIO
+    yield_strength: float | str = YIELD_STRENGTH
     hardening: float | str = 0.0
     quadrature: Literal["spline", "gauss", "gauss+1"] = "gauss+1"
 
@@ -126,11 +127,7 @@ class PlasticOptions(LoadStepOptions):
         """Return the numbers of a material by its name. Raises InputError where it does not yield."""
         if self.material is None:
             return {}
-        for name in OF_LIBRARY:
-            if getattr(self, name) != getattr(type(self), name):
-                raise InputError(
-                    f"--material and --{name.replace('_', '-')}: give one of them, the material has its own"
-                )
+        demand_unstated(self, OF_LIBRARY)
         found = self._materials
         for one in found.values():
             if not isinstance(one.young, float) or one.yield_strength is None:

@@ -113,7 +113,7 @@ def by_patch(flag: str, text: str, read: Callable[[str], Any]) -> Any:
 
 def numbers(flag: str, given: float | str) -> Any:
     """Return a number, or the numbers of each patch or solid. Raises InputError."""
-    return given if not isinstance(given, str) else by_patch(flag, given, lambda text: number(flag, text))
+    return _plain(given) if not isinstance(given, str) else by_patch(flag, given, lambda text: number(flag, text))
 
 
 def constants(flag: str, given: float | str | None) -> Any:
@@ -127,7 +127,12 @@ def constants(flag: str, given: float | str | None) -> Any:
             )
         return parts[0] if len(parts) == 1 else tuple(parts)
 
-    return given if not isinstance(given, str) else by_patch(flag, given, read)
+    return _plain(given) if not isinstance(given, str) else by_patch(flag, given, read)
+
+
+def _plain(given: float | None) -> float | None:
+    """Return a number without its class."""
+    return float(given) if isinstance(given, float) else given
 
 
 def number(flag: str, text: str) -> float:

@@ -111,8 +111,9 @@ class NeoHookean(Hyperelastic):
     ----------
     shear, bulk : float
         mu > 0 and K > 0; for small strains those of a linear elastic body.
-    body_force, conditions, fix, roller, symmetry, load, pressure, spring
-        As of `Plasticity`. Loads are dead; a pressure is that per area at rest, along the normal at rest.
+    body_force, density, gravity, acceleration, spin, conditions, fix, roller, symmetry, load, pressure, spring
+        As of `Plasticity`. Loads are dead; a pressure is that per area at rest, along the normal at rest, and a spin
+        pulls as at the body at rest.
 
     Raises
     ------
@@ -147,7 +148,7 @@ class MooneyRivlin(Hyperelastic):
     ----------
     c10, c01, bulk : float
         c10 + c01 > 0, half of the shear modulus for small strains, and K > 0.
-    body_force, conditions, fix, roller, symmetry, load, pressure, spring
+    body_force, density, gravity, acceleration, spin, conditions, fix, roller, symmetry, load, pressure, spring
         As of `NeoHookean`.
 
     Raises
@@ -185,7 +186,7 @@ class Yeoh(Hyperelastic):
     ----------
     c10, c20, c30, bulk : float
         c10 > 0, half of the shear modulus for small strains, and K > 0.
-    body_force, conditions, fix, roller, symmetry, load, pressure, spring
+    body_force, density, gravity, acceleration, spin, conditions, fix, roller, symmetry, load, pressure, spring
         As of `NeoHookean`.
 
     Raises

@@ -14,6 +14,7 @@ from parameterize.arrays import Array
 
 from .conditions import OF_BODIES, Condition, GivenRegions
 from .data import Data
+from .inertia import with_inertia
 from .owners import Owner, entry_of
 from .problem import LawWithData
 from .stresses import outer_principal, principal, von_mises
@@ -33,6 +34,10 @@ class NonlinearBody(LawWithData):
     """
 
     body_force: Data | None = None
+    density: Number | None = None
+    gravity: Data | None = None
+    acceleration: Data | None = None
+    spin: tuple[Data, Data] | None = None
     conditions: Sequence[Condition] = ()  # type: ignore[assignment]  # a tuple once the problem is made
     fix: GivenRegions | None = None
     roller: GivenRegions | None = None
@@ -66,7 +71,8 @@ class NonlinearBody(LawWithData):
         self._read_keywords()
         if not self.conditions:
             raise ValueError("nothing holds the body: give fix, roller, symmetry or spring")
-        self._set({"source": NONE if self.body_force is None else self.body_force}, None, None)
+        force = with_inertia(self.body_force, self.density, self.gravity, self.acceleration, self.spin)
+        self._set({"source": NONE if force is None else force}, None, None)
         if not self.by_patch:
             self.check_material()
 

@@ -39,6 +39,8 @@ class Plasticity(NonlinearBody):
         H >= 0, the slope of the yield stress over the plastic strain; zero by default, which is perfect plasticity.
     body_force : three entries, optional
         Force per volume.
+    density, gravity, acceleration, spin : optional
+        The body's mass per volume, and what acts on it, as of `Elasticity`.
     conditions : sequence of Fix, Roller, Symmetry, Load, Pressure or Spring
         Supports and loads on regions; the rest of the boundary is free.
     fix, roller, symmetry, load, pressure, spring : dict of region to data, optional
