@@ -51,6 +51,13 @@ class VolumeMesh:
     ------
     ValueError
         For a mesh without elements, a node that does not exist, coordinates that are not finite, or are too large.
+
+    Examples
+    --------
+    >>> import iga_nn
+    >>> mesh = iga_nn.VolumeMesh.of([(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)], {"tetra": [[0, 1, 2, 3]]})
+    >>> iga_nn.certify_mesh(mesh).verdict
+    'certified'
     """
 
     points: Array

@@ -42,6 +42,15 @@ class OverlapCheck:
         A place that the reason speaks of.
     touching : int
         Pairs of faces in the same place whose nodes are different: they touch, and are not glued.
+
+    Examples
+    --------
+    >>> from parameterize.meshes.kinds import kind_named
+    >>> from parameterize.meshes.mesh import VolumeMesh
+    >>> from parameterize.meshes.overlap import check_overlap
+    >>> tetra = kind_named("tetra")
+    >>> check_overlap(VolumeMesh.of(tetra.lattice, {"tetra": [[0, 1, 2, 3]]}), 1).overlap
+    False
     """
 
     overlap: bool | None

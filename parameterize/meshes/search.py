@@ -41,6 +41,14 @@ class ElementsCertificate:
         Parameters of the point with the least value of det J met; not a number where none was looked for.
     least : (n,) array
         The value there, divided by the magnitude of the mean.
+
+    Examples
+    --------
+    >>> from parameterize.meshes.kinds import kind_named
+    >>> from parameterize.meshes.search import certify_elements
+    >>> tetra = kind_named("tetra")
+    >>> [round(volume, 6) for volume in certify_elements(tetra, tetra.lattice[None].astype(float)).volumes.tolist()]
+    [0.166667]
     """
 
     kind: ElementKind
