@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import iga_nn
+from iga_nn.report.extremes import peak_notices
 
 YIELD, HARDENING = 235.0, 1000.0
 
@@ -49,3 +50,14 @@ def test_a_law_that_does_not_flow_has_no_limit_load():
 
     assert "limit load" in _why_not_all(0.8, True)
     assert "limit" not in _why_not_all(0.4, False) and "K up to 1000 times" in _why_not_all(0.4, False)
+
+
+def test_a_peak_that_splines_smooth_has_a_notice(bent):
+    def section(**more):
+        found = bent.extremes("plastic_strain").as_dict() | more
+        return {"levels": [bent.report.as_dict() | {"singular": [], "extremes": {"plastic_strain": found}}]}
+
+    flowed = bent.report.load_steps[-1].plastic_strain
+    (notice,) = peak_notices(section())
+    assert notice.startswith(f"the equivalent plastic strain reaches {flowed:.4g} at a Gauss point")
+    assert not peak_notices(section(largest=flowed)) and not peak_notices(section(spans=2.0, radius=0.1))

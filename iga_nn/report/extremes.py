@@ -27,6 +27,7 @@ SAYINGS = {  # quantity -> its words, the extreme that they name, and the sectio
 STRESS = "von_mises"
 DERIVATIVES = {STRESS: "von Mises stress", "flux_magnitude": "|flux|", "gradient_magnitude": "|gradient|"}
 GROWTH = 1.1  # of the largest stress while h is halved; smooth ones, resolved, grow less, at clamped rims 1.2 and more
+SMOOTHED = 1.05  # the plastic strain at the Gauss points over that of splines, up to which there is no notice
 MOST_PLACES = 3  # named where a stress is infinite
 TINY = 1e-6  # of the largest coordinate: smaller ones are shown as 0
 
@@ -69,7 +70,19 @@ def peak_notices(section: dict[str, Any]) -> list[str]:
     known = _known(section)
     if known and "singular" not in known[-1]:  # of a version that did not know these places
         return _growth(known, section) if len(known) > 1 else _of_one_level(known, section)
-    return [*_of_singular_places(known, section), *_growth(known, section)]
+    return [*_of_singular_places(known, section), *_growth(known, section), *_smoothed(known)]
+
+
+def _smoothed(known: Sequence[Level]) -> list[str]:
+    """Return a notice where splines smooth the peak of the plastic strain at the Gauss points, away from rims."""
+    found = known[-1]["extremes"].get("plastic_strain") if known else None
+    at_points = known[-1]["load_steps"][-1].get("plastic_strain") if found and known[-1].get("load_steps") else None
+    if at_points is None or found is None or "spans" in found or at_points <= SMOOTHED * found["largest"]:
+        return []
+    return [
+        f"the equivalent plastic strain reaches {at_points:.4g} at a Gauss point, and the splines of this mesh "
+        f"{found['largest']:.4g}: they smooth the peak; one more --refine resolves it better"
+    ]
 
 
 def _of_singular_places(known: Sequence[Level], section: dict[str, Any]) -> list[str]:
