@@ -4,7 +4,7 @@ import signal
 import sys
 from types import FrameType
 
-from .signals import is_compiling
+from .signals import loses_errors
 
 PAUSE = 0.1  # seconds after which an interruption is tried again
 
@@ -35,8 +35,8 @@ def catch_signals() -> None:
 
 
 def _interrupt(number: int, frame: FrameType | None) -> None:
-    """Interrupt; later, where LLVM has called Python while it compiles a kernel: an error raised there gets lost."""
-    if hasattr(signal, "setitimer") and is_compiling(frame):
+    """Interrupt; later, where an error raised now would get lost."""
+    if hasattr(signal, "setitimer") and loses_errors(frame):
         signal.signal(signal.SIGALRM, _interrupt)
         signal.setitimer(signal.ITIMER_REAL, PAUSE)
         return

@@ -7,13 +7,14 @@ from typing import Any
 from parameterize.arrays import listed
 
 from ..rounding import distance
-from . import asked, extremes
+from . import asked, balance, extremes
 from . import document as reports
 from .document import Report
 from .statement import regions_of, statement_of
 
 MOST_ROWS = 8  # of a table: the sheet is one page
-LONGEST = 90  # letters of a cell
+LONGEST = 160  # letters of a cell
+MOST_NOTES, LONGEST_NOTE = 8, 260  # lines below the results, and letters of one
 
 Row = tuple[str, ...]
 
@@ -24,7 +25,7 @@ class Sheet:
 
     subject: the part's file and its hash, and the volume's. proof: what is proved of the map, and how near it is to the
     part. problem: equation and material. conditions: supports and loads. results: the answers with their intervals, or
-    the largest values without.
+    the largest values without. notes: what the results rest on, notices of the solve, and what the supports answer.
     """
 
     subject: list[Row]
@@ -32,13 +33,13 @@ class Sheet:
     problem: list[Row]
     conditions: list[Row]
     results: list[Row]
+    notes: list[str]
 
 
 def sheet_of(report: Report) -> Sheet:
     """Return the sheet of a finished report."""
-    return Sheet(
-        _subject(report), _proof(report), _cut(statement_of(report)), _cut(regions_of(report)), _results(report)
-    )
+    problem, conditions = _cut(statement_of(report)), _cut(regions_of(report))
+    return Sheet(_subject(report), _proof(report), problem, conditions, _results(report), _notes(report))
 
 
 def _subject(report: Report) -> list[Row]:
@@ -80,6 +81,18 @@ def _results(report: Report) -> list[Row]:
     frequencies = enumerate(section.get("frequencies", ()), start=1)
     rows += [(f"mode {number}", f"{hertz:.4g} Hz", "no interval") for number, hertz in frequencies]
     return _cut([("quantity", "value", "interval"), *rows]) if rows else []
+
+
+def _notes(report: Report) -> list[str]:
+    """Return what must be known beside the results, the most important first."""
+    section = reports.solved(report)
+    levels = section.get("levels") or [{}]
+    notes = [*levels[-1].get("notices", ()), *extremes.lines(section)[:2]]
+    notes += [f"{ask}: {why}" for ask, _, _, why in asked.rows(section) if why]
+    notes += [f"Balance: {line}" for line in balance.lines(section)[:3]]
+    left = len(notes) - MOST_NOTES
+    short = [text if len(text) <= LONGEST_NOTE else f"{text[: LONGEST_NOTE - 1]}…" for text in notes[:MOST_NOTES]]
+    return [*short, f"and {left} more in the report"] if left > 0 else short
 
 
 def _cut(rows: list[Any]) -> list[Row]:

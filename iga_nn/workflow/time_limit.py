@@ -23,7 +23,7 @@ from parameterize.time_limit import (
 
 from ..options.texts import duration
 from ..rounding import clock as clock_of
-from ..signals import is_compiling
+from ..signals import loses_errors
 from .pace import end_seconds, pace
 
 TICK = 0.5  # seconds between two looks at the clock
@@ -107,7 +107,7 @@ def stopped_in_words() -> str:
 
 def _is_due(limit: TimeLimit, frame: FrameType | None) -> bool:
     """Return whether the stage that runs is to be interrupted now; then it is told only once."""
-    if limit.is_closing or limit.is_told or limit.left > 0.0 or is_compiling(frame):
+    if limit.is_closing or limit.is_told or limit.left > 0.0 or loses_errors(frame):
         return False
     limit.is_told = True
     return True

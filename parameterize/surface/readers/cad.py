@@ -200,7 +200,10 @@ def _run(data: bytes, kind: str, deflection: float | None, unit: Unit) -> tuple[
             raise MeshError(f"OpenCASCADE cannot read it as {kind.upper()}; {DAMAGED}")
         with np.load(target) as arrays:
             found = dict(arrays)
-    return found, json.loads(str(found.pop("facts")))
+    facts = json.loads(str(found.pop("facts")))
+    if "refused" in facts:
+        raise MeshError(facts["refused"])
+    return found, facts
 
 
 def passed_over(data: bytes) -> Counter[str]:

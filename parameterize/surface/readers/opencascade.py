@@ -58,6 +58,7 @@ from OCP.TopTools import TopTools_FormatVersion
 
 CLOSE = 1e-6  # of the box's diagonal: solids that are as close touch
 SEWN = 1e-5  # of the box's diagonal: gaps between the faces of a model without solids that are sewn
+FINEST = 1e-6  # of the box's diagonal: finer triangles take minutes
 LEAST = 1e-6  # of its unit: its tolerance is a tenth of that, and smaller deflections are refused
 NO_AREA = 1e-10  # of the square of the diagonal: a face that needs no triangles, as its neighbours meet over it
 
@@ -410,6 +411,12 @@ def main(
         bodies, states = map(list, zip(*map(healed, bodies), strict=True))
     found = glued(bodies) if len(bodies) > 1 and what == "solid" else as_given(bodies)
     size = diagonal(compound(bodies)) if bodies else 0.0
+    if 0.0 < float(deflection) < FINEST * size:
+        said = (
+            f"deflection must be at least a millionth of the box's diagonal, {FINEST * size / float(factor):.3g} here"
+        )
+        np.savez(target, facts=np.array(json.dumps({"refused": said})))
+        return
     wanted = max(float(deflection) or float(share) * size, LEAST)
     for body in found.shapes:
         BRepMesh_IncrementalMesh(body, wanted, False, float(angle), False)
