@@ -156,7 +156,7 @@ class Deck:
         """Return the faces of regions by names that the file may have."""
         found: dict[str, tuple[IntArray, IntArray]] = {}
         for name, rows in self.sets.items():
-            plain = re.sub(r"\W+", "_", name).upper().strip("_")[:LONGEST] or "GROUP"
+            plain = re.sub(r"\W+", "_", re.sub(r"-(?=[\d.])", " minus ", name)).upper().strip("_")[:LONGEST] or "GROUP"
             plain = plain if plain[0].isalpha() else f"GROUP_{plain}"
             again = sum(1 for other in found if other == plain or other.startswith(f"{plain}_AGAIN"))
             found[plain if not again else f"{plain}_AGAIN{again}"] = rows

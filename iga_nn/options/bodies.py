@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar, Literal  # noqa: F401  # Literal is in the annotations of ProblemOptions
 
-from ..errors import input_errors
+from ..errors import InputError, input_errors
 from .problem import Formula, ProblemOptions, Row, Units, by_patch
 from .texts import at_point, numbers, vector
 
@@ -114,6 +114,8 @@ class BodyOptions(ProblemOptions, ABC):
 
         The force has that of gravity, acceleration and spin in it. Raises InputError for text that is refused.
         """
+        if self.density is not None and not (self.gravity or self.acceleration or self.spin):
+            raise InputError("--density alone does nothing: give --gravity, --acceleration or --spin, too")
         force = by_patch("--body-force", self.body_force, lambda text: vector("--body-force", text))
         mass = {
             "density": self.density_given(),

@@ -17,6 +17,7 @@ _EQUALS = re.compile("(?<![<>=])=(?!=)")
 _OWNER = re.compile(r"""(?:^|,)\s*("[^"]*"|'[^']*'|[^,:"']*[^,:"'\s])\s*:""")
 _DURATION = re.compile(r"(\d+\.?\d*|\.\d+)\s*(s|min|h)?")
 _SECONDS = {"s": 1.0, "min": 60.0, "h": 3600.0}
+_AT = re.compile(r"\bat\s*\(")
 _PATCH = re.compile(r"p(\d+)")
 _AT_POINT = re.compile(r"(.*)\sat\s*\((.*)\)\s*")
 _OF_REGION = re.compile("\"[^\"]*\"|'[^']*'|plane\\s+[xyz]\\s*=")  # quoted text, and planes of a solid model
@@ -70,6 +71,8 @@ def datum(kind: type[Condition], entries: int, text: str) -> Any:
         return factor, outside if entries == 1 else vector(flag, outside)
     if entries == 1:
         return text
+    if _AT.search(text):
+        raise InputError(f"{flag} {text!r:.80}: acts at no point: leave 'at (x, y, z)' out")
     parts = vector(flag, text)
     return [entry if entry.strip() else None for entry in parts or ()] if kind.is_essential else parts
 

@@ -349,7 +349,8 @@ def with_part(
     from parameterize.cube.boundary_map import read_part
 
     if not beside.is_file():
-        raise InputError(f"{beside}: is not there, and without it group:NAME and face(x, y, z) mean nothing")
+        needed = "regions by faces of the part, such as 'bore 1', face4, face(x, y, z) or group:NAME, need it"
+        raise InputError(f"{beside}: is not there, and {needed}: keep it beside the volume, or use x, y, z, nx, ny, nz")
     with input_errors():
         part = read_part(beside)
         return problem.on_surface(part), replace(options, ask=tuple(ask.placed(surface=part) for ask in options.ask))

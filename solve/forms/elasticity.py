@@ -150,6 +150,7 @@ class Elasticity(LawWithData):
     hooke: Hooke = field(init=False, repr=False, compare=False)  # of several solids, that of the first
 
     components = 3
+    _is_by_material: ClassVar[bool] = False  # whether constants are those of a material for each solid
     labels: ClassVar = {"source": "body_force", "boundary": "displacement", "neumann": "traction"}
     keywords: ClassVar = OF_BODIES
 
@@ -210,7 +211,7 @@ class Elasticity(LawWithData):
             if self.density is None:
                 mass = {who: one.density for who, one in found.items()}
                 self._assign(density=mass if isinstance(self.material, Mapping) else mass[None])
-            self._assign(material=None)
+            self._assign(material=None, _is_by_material=isinstance(self.material, Mapping))
         for name in CONSTANTS[:-1]:
             given = getattr(self, name)
             by_owner = {who: _row(own) for who, own in given.items()} if isinstance(given, Mapping) else _row(given)
@@ -276,7 +277,10 @@ class Elasticity(LawWithData):
     def by_patch(self) -> dict[str, Collection[Owner]]:
         """Return the patches or solids for which data are given one by one, by the name of the datum."""
         given = {name: getattr(self, name) for name in CONSTANTS}
-        return super().by_patch | {name: own.keys() for name, own in given.items() if isinstance(own, Mapping)}
+        owners = {name: own.keys() for name, own in given.items() if isinstance(own, Mapping)}
+        if self._is_by_material and owners:
+            owners = {"material": next(iter(owners.values()))}
+        return super().by_patch | owners
 
     def on(self, body: BodyLike) -> Self:
         """Return the same problem on a body, along whose parameters the axes of a material may be."""
@@ -382,7 +386,8 @@ class Elasticity(LawWithData):
         """Return the yield strength over von Mises' stress (...), up to MOST_SAFE."""
         strength = float(_values(self.yield_strength)[0] or np.inf)
         equivalent = von_mises(self.whole_flux(u, grad, x))
-        return np.minimum(MOST_SAFE, strength / np.maximum(equivalent, np.finfo(float).tiny))
+        with np.errstate(over="ignore"):  # of a body at rest
+            return np.minimum(MOST_SAFE, strength / np.maximum(equivalent, np.finfo(float).tiny))
 
     @property
     def reported(self) -> tuple[str, ...]:
