@@ -55,6 +55,7 @@ _HOME = {  # module, and the name there where it is another one; type checkers r
     "Problem": "solve",
     "Region": "solve",
     "RemoteForce": "solve.forms.conditions",
+    "Rigid": "solve.forms.conditions",
     "Robin": "solve.forms.conditions",
     "Roller": "solve.forms.conditions",
     "SplineField": "solve",

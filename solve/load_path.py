@@ -103,6 +103,8 @@ def along_the_load(body: BodyLike, problem: BoundaryValueProblem, options: Solve
     """
     if options.ask:
         raise ValueError(f"ask {str(options.ask[0])!r}: intervals are known of linear laws only; leave ask out")
+    if options.comm is not None and options.comm.size > 1:
+        raise ValueError("load steps are taken in one process: leave comm out")
     if problem.form.history:
         if options.grading is not None:
             raise ValueError(GRADING)

@@ -17,6 +17,7 @@ from .discretization.space import TrialSpace, trial_space
 from .forms.boundary_value_problem import BoundaryValueProblem
 from .forms.elasticity import Elasticity
 from .forms.poisson import Poisson
+from .forms.rigid import demand_known_motions
 from .mixed import build_mixed, is_mixed
 from .options import SolveOptions
 from .patch_system import PatchProblem
@@ -38,6 +39,7 @@ def prepared(
     body: Body, problem: BoundaryValueProblem, options: SolveOptions
 ) -> tuple[BoundaryValueProblem, list[PatchProblem]]:
     """Check body and problem; return the problem placed in the body, and the problem on each patch."""
+    demand_known_motions(problem)
     placed, patches = on_patches(body, problem, options)
     if all(any(part.stop <= part.start for part in patch.space.free) for patch in patches):
         raise ValueError(

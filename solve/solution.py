@@ -19,6 +19,7 @@ from .discretization.error_norms import Errors
 from .field import BodyField, SplineField
 from .forms.boundary_value_problem import BoundaryValueProblem
 from .forms.form import Quantity
+from .forms.rigid import RigidMotion
 from .outside import all_extremes_outside, extremes_outside
 from .quantities import Extremes, all_extremes, at_points, extremes, on_grid
 from .reactions import Balance
@@ -122,6 +123,8 @@ class SolveReport:
         The load steps of a law that is not linear, up to the last one that is in equilibrium.
     interrupted : bool
         Whether the user, or the clock, interrupted the load steps.
+    rigid : tuple of RigidMotion
+        The motions of rigid regions.
 
     Examples
     --------
@@ -151,6 +154,7 @@ class SolveReport:
     asked: tuple[Answer, ...] = ()
     load_steps: tuple[LoadStep, ...] = ()
     interrupted: bool = False
+    rigid: tuple[RigidMotion, ...] = ()
 
     l2 = _known("errors", "l2")
     l2_relative = _known("errors", "l2_relative")
@@ -171,6 +175,7 @@ class SolveReport:
         found: dict[str, Any] = {"asked": [answer.as_dict() for answer in self.asked]} if self.asked else {}
         found |= {name: value for name in names if (value := getattr(self, name)) is not None}
         found |= self.balance.as_dict() if self.balance and self.balance.is_told else {}
+        found |= {"rigid": [motion.as_dict() for motion in self.rigid]} if self.rigid else {}
         found |= {} if self.formulation == "displacement" else {"formulation": self.formulation}
         if self.load_steps:
             found |= {"load_factor": self.load_factor, "load_steps": [step.as_dict() for step in self.load_steps]}
@@ -184,7 +189,7 @@ class SolveReport:
         state = "" if self.converged else f", NOT CONVERGED (residual {self.residual:.1e})"
         answers = [str(self.balance)] if self.balance and self.balance.reactions and self.balance.is_told else []
         level = ", ".join([*parts, f"{self.iterations} iterations{state}"])
-        return "\n".join([*map(str, self.asked), level, *answers, *self.notices])
+        return "\n".join([*map(str, self.asked), level, *answers, *map(str, self.rigid), *self.notices])
 
 
 @dataclass(frozen=True, eq=False, repr=False)

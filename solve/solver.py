@@ -6,6 +6,8 @@ from typing import Any
 from parameterize.old_names import takes_volume
 from parameterize.spline.body import BodyLike, as_body
 
+from .answer import NOT_ESTIMATED
+from .asked.away import away
 from .asked.functional import functional
 from .asked.interval import answers
 from .assembly import assemble_body_data, balanced
@@ -20,6 +22,7 @@ from .forms.nonlinear_body import NonlinearBody
 from .forms.poisson import Poisson
 from .forms.problem import Problem
 from .load_path import along_the_load
+from .motions import at_rest, has_rigid, solved_with_motions
 from .options import SolveOptions, check_device
 from .preparation import discretized, on_patches
 from .solution import Solution
@@ -118,6 +121,8 @@ def solve_with(body: BodyLike, problem: BoundaryValueProblem, options: SolveOpti
     check_device(options.device, problem)
     if isinstance(problem, NonlinearBody):
         return along_the_load(body, problem, options)
+    if has_rigid(problem):
+        return _with_motions(body, problem, options)
     functionals = [functional(ask, problem, body) for ask in options.ask]
     system = discretized(body, problem, options)
     solution = system.solve_with(options)
@@ -125,6 +130,17 @@ def solve_with(body: BodyLike, problem: BoundaryValueProblem, options: SolveOpti
         return solution
     found = answers(system, solution, functionals, options)
     return replace(solution, report=replace(solution.report, asked=found))
+
+
+def _with_motions(body: BodyLike, problem: BoundaryValueProblem, options: SolveOptions) -> Solution:
+    """Return the solution of a problem with rigid regions; asks have no intervals."""
+    functionals = [functional(ask, problem, body) for ask in options.ask]
+    _, solution = solved_with_motions(problem, options, lambda still: discretized(body, still, options))
+    found = tuple(
+        replace(one.answer(solution), why=f"{NOT_ESTIMATED}: the motion of a rigid region is found by the solve")
+        for one in (away(one, solution) for one in functionals)
+    )
+    return replace(solution, report=replace(solution.report, asked=found)) if found else solution
 
 
 @takes_volume
@@ -178,6 +194,7 @@ def check_problem(body: BodyLike, problem: BoundaryValueProblem, comm: Any = Non
     or have the wrong sign, ValueError where they do not balance.
     """
     problem.demand_held()
+    problem = at_rest(problem, comm)
     options = SolveOptions(threads=1, quadrature="gauss", comm=comm)
     glued = as_body(body)
     placed, patches = on_patches(glued, problem, options)

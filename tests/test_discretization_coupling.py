@@ -106,6 +106,16 @@ def test_regions_that_do_not_fit_are_refused(cut, said):
         iga_nn.solve(quarter_ring(), turning(iga_nn.Cyclic(*cut)))
 
 
+@pytest.mark.parametrize("kind", [iga_nn.Fix, lambda region: iga_nn.Load(region, (0, 0, 1))])
+def test_a_condition_that_covers_a_part_of_a_cut_is_refused(kind):
+    region, cut = "x*x + y*y < 1.5 and nz*nz < 0.5", iga_nn.Cyclic(FIRST, SECOND)
+    remedy = f"where the whole body goes on: write '{region} and not ({FIRST})'"
+    with pytest.raises(ValueError) as found:
+        law = iga_nn.Elasticity(conditions=[iga_nn.Fix("nz < -0.99"), kind(region), cut])
+        iga_nn.solve(quarter_ring(), law, degree=2)
+    assert str(found.value).endswith(remedy) and f"acts on a cut of {cut.role}" in str(found.value)
+
+
 def test_what_does_not_know_couplings_refuses_them():
     cut = iga_nn.Cyclic(FIRST, SECOND)
     with pytest.raises(ValueError, match="formulation='displacement' only"):

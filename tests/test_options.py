@@ -23,14 +23,13 @@ NOT_TOLD = {"unit", "stress_unit", "solve_anyway"}  # but to the reader, and to 
 SPACE = {"refine": (2,), "degree": 2, "quadrature": "gauss", "ask": ("energy",), "accuracy": "1%"}
 SCALAR = dict.fromkeys(("exact", "source", "boundary", "kappa", "reaction"), "1")
 VECTOR = dict.fromkeys(("exact", "body_force", "displacement"), "1;1;1")
-REFUSED = {"exact": "1;1;1", "ask": ("energy",), "accuracy": "1%"} | dict.fromkeys(
-    ("shear", "c10", "c01", "c20", "c30"), 7.0
-)
+REFUSED = {"exact": "1;1;1", "ask": ("energy",), "accuracy": "1%"}
+REFUSED |= {"cyclic": ("u0, u1 about z",), "rigid": ("x < 1",)}
+REFUSED |= dict.fromkeys(("shear", "c10", "c01", "c20", "c30"), 7.0)
 BODY = (
     {"fix": ("x < 1",), "roller": ("x < 1",), "body_force": "1;1;1"}
     | {"symmetry": ("x < 1",), "load": ("x < 1=1;1;1",), "pressure": ("x < 1=1",), "spring": ("x < 1=1",)}
     | dict.fromkeys(("total_spring", "foundation"), ("x < 1=1",))
-    | {"cyclic": ("u0, u1 about z",)}
     | dict.fromkeys(("total_force", "moment", "bearing"), ("x < 1=1;1;1",))
     | dict.fromkeys(("turn", "hydrostatic", "remote_force"), ("x < 1=1;1;1 at (0, 0, 1)",))
     | {"density": 2.0, "gravity": "0;1;0", "acceleration": "1;0;0", "spin": "0;0;1 at (0, 0, 0)"}
@@ -55,7 +54,7 @@ OTHERS = {
     | VECTOR
     | {"traction": ("u1=1;1;1",), "young": "4;2;2", "poisson_ratio": "0.1;0.2;0.2", "formulation": "mixed"}
     | {"shear_modulus": "1;2;1", "first_axis": "0;1;0", "second_axis": "0;1;1", "yield_strength": 3.0}
-    | {"alpha": 2e-5, "temperature_change": "30"}
+    | {"alpha": 2e-5, "temperature_change": "30", "cyclic": ("u0, u1 about z",), "rigid": ("x < 1",)}
     | BODY,
 }
 
@@ -197,3 +196,16 @@ def test_a_metal_of_the_library_yields_at_its_strength():
     assert (metal.young, metal.poisson_ratio, metal.yield_strength) == (210000.0, 0.3, 235.0)
     with pytest.raises(InputError, match="--material and --young: give one of them"):
         PlasticOptions(material="steel", young=2.0, fix=("u0",), load=("u1=1;0;0",)).problem()
+
+
+@pytest.mark.parametrize("kind", [iga_nn.PlasticOptions, iga_nn.FiniteOptions])
+def test_load_steps_refuse_coupled_regions_before_a_map_is_made(kind):
+    with pytest.raises(InputError, match="--cyclic: regions are coupled in linear problems only; leave it out"):
+        kind(fix=("u0",), load=("u1=0;0;1",), cyclic=("v0, v1 about z",))
+    with pytest.raises(InputError, match="--rigid: motions of rigid regions are found in linear problems only"):
+        kind(fix=("u0",), load=("u1=0;0;1",), rigid=("u1",))
+
+
+def test_rigid_regions_and_an_accuracy_are_refused_together():
+    with pytest.raises(InputError, match="--rigid: its meshes are not refined by --accuracy; leave one of them out"):
+        iga_nn.ElasticityOptions(fix=("u0",), rigid=("u1",), accuracy=0.1)

@@ -9,7 +9,10 @@ import pytest
 from mpi_job import mpiexec
 
 from iga_nn.cli.commands import main
+from iga_nn.errors import InputError
+from iga_nn.options import FiniteOptions
 from iga_nn.workflow import mpi_job
+from iga_nn.workflow.pipeline import solve_to
 from solve import Poisson, SplineField, benchmark_volume, solve_problem
 
 SOLVE = ("mpi_command.py", "solve", "poisson", "map.npz", "--refine", "1", "--mpi", "--quiet")
@@ -91,6 +94,8 @@ def test_what_does_not_fit_mpi_is_a_line(folder, monkeypatch, capsys):
     monkeypatch.chdir(folder)
     assert main(["solve", "poisson", "map.npz", "--mpi", "--device", "cuda"]) == 2
     assert capsys.readouterr().err == "iga-nn: device 'cuda': --mpi runs on the CPU; leave one of them out\n"
+    with pytest.raises(InputError, match="solve finite takes its load steps in one process: leave --mpi out"):
+        solve_to("map.npz", problem_options=FiniteOptions(), out="out", comm=object())
     monkeypatch.setitem(sys.modules, "mpi4py", None)
     assert main(["solve", "poisson", "map.npz", "--mpi"]) == 2
     (line,) = capsys.readouterr().err.splitlines()

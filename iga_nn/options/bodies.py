@@ -34,6 +34,9 @@ class BodyOptions(ProblemOptions, ABC):
             on the second cut are those on the first, turned. The angle follows from the regions.
         turn: regions turned by a small angle in radians about an axis through a point, each as
             "REGION=VECTOR at POINT".
+        rigid: regions that move as rigid bodies, each as REGION; total forces, moments and remote forces on the same
+            region act on the rigid body. "REGION=VECTOR" gives its displacement without a turn; an entry that is left
+            out stays free.
         spring: regions held by springs, force per area and displacement, each as "REGION=FORMULA".
         total_spring: regions held by a spring, force per displacement, shared out over the area, each as
             "REGION=NUMBER".
@@ -62,6 +65,7 @@ class BodyOptions(ProblemOptions, ABC):
     symmetry: tuple[str, ...] = ()
     cyclic: tuple[str, ...] = ()
     turn: tuple[str, ...] = ()
+    rigid: tuple[str, ...] = ()
     spring: tuple[str, ...] = ()
     total_spring: tuple[str, ...] = ()
     foundation: tuple[str, ...] = ()
@@ -88,6 +92,11 @@ class BodyOptions(ProblemOptions, ABC):
         ("spin", "Angular velocity at a point of the axis, such as 0;0;314 at (0, 0, 0)", "none"),
     )
 
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.rigid and self.accuracy is not None:
+            raise InputError("--rigid: its meshes are not refined by --accuracy; leave one of them out")
+
     @property
     def units(self) -> Units:
         """Return the units for colour bars and places."""
@@ -96,7 +105,7 @@ class BodyOptions(ProblemOptions, ABC):
     @property
     def is_loaded(self) -> bool:
         """Return whether a force or a given displacement acts on the body."""
-        return any(getattr(self, name) for name in (*LOADS, "fix", "turn"))
+        return any(getattr(self, name) for name in (*LOADS, "fix", "turn", "rigid"))
 
     @classmethod
     def mass_rows(cls, section: Mapping[str, Any]) -> list[Row]:

@@ -23,6 +23,8 @@ OF_LINEAR_LAWS = {  # options that a law has only if it is linear, and why
     "exact": "a law that is not linear takes no exact solution",
     "ask": "intervals are known of linear laws alone",
     "accuracy": "the error of linear laws alone is estimated",
+    "rigid": "motions of rigid regions are found in linear problems only",
+    "cyclic": "regions are coupled in linear problems only",
 }
 
 

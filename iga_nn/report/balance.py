@@ -5,6 +5,7 @@ For elasticity these are forces, for a scalar law inflows. The unit of forces is
 
 import math
 import re
+from collections.abc import Sequence
 from typing import Any
 
 from ..level_table import capitalized
@@ -35,6 +36,10 @@ def table(section: dict[str, Any]) -> list[list[str]]:
     shown = [["", *head], *([capitalized(role), *_numbers(values, level)] for role, values in rows)]
     of = unit and f" [{moment_unit_of(section)}]"
     shown += [[f"Moment about the origin, {role}{of}", *numbers] for role, numbers in _moments(level)]
+    length = section.get("unit")
+    for motion in level.get("rigid", ()):
+        for name, own in (("shift", f" [{length}]" if length else ""), ("turn", " [rad]")):
+            shown.append([f"{capitalized(name)} of {motion['region']}{own}", *_six_digits(motion[name])])
     if "imbalance" in level:
         shown.append(["Imbalance, relative", f"{level['imbalance']:.1e}", *[""] * (len(head) - 1)])
     return shown
@@ -50,7 +55,17 @@ def lines(section: dict[str, Any]) -> list[str]:
     found = [f"{said} {_vector(_numbers(values, level))}{unit and f' {unit}'}" for said, values in rows]
     turning = [f"{role} {_vector(numbers)}" for role, numbers in _moments(level)]
     of = unit and f" in {moment_unit_of(section)}"
+    found += [
+        f"{motion['region']} shifts by {_vector(_six_digits(motion['shift']))} at "
+        f"{_vector(_six_digits(motion['centre']))}, turns by {_vector(_six_digits(motion['turn']))} rad, "
+        f"its loads balanced to {motion['residual']:.0e}"
+        for motion in level.get("rigid", ())
+    ]
     return found + ([f"moments about the origin{of}: {', '.join(turning)}"] if turning else [])
+
+
+def _six_digits(values: Sequence[float]) -> list[str]:
+    return [f"{value:.6g}" for value in values]
 
 
 def _finest(section: dict[str, Any]) -> dict[str, Any]:

@@ -41,6 +41,7 @@ from ..options import (
     Units,
     check_size,
 )
+from ..options.load_steps import LoadStepOptions
 from ..report import asked, html
 from ..report import document as reports
 from ..type_check import check_type
@@ -294,6 +295,8 @@ def solve_to(
         raise InputError("--accuracy refines in one process: leave --mpi out")
     if comm is not None and (resume or time_limit is not None):
         raise InputError("--resume and --time-limit are for solves in one process: leave --mpi out")
+    if comm is not None and isinstance(problem_options, LoadStepOptions):
+        raise InputError(f"solve {problem_options.section} takes its load steps in one process: leave --mpi out")
     problem, options = with_part(problem_options.problem(), problem_options.solve_options(), path)
     loaded, options = load_volume(path), replace(options, device=device, comm=comm)
     processes = 1 if comm is None else comm.size

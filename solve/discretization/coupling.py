@@ -27,6 +27,7 @@ from parameterize.spline.spline_stack import VALUE
 from parameterize.spline.volume import UNITS
 
 from ..field import Points
+from ..forms.condition import Condition
 from ..forms.coupled import Cyclic
 from .groups import CoefficientLayout, OnPatches
 from .images import Located, nearest_on
@@ -41,6 +42,7 @@ GAMMA = 0.5
 FIT = 2e-3  # share of a body's size by which the image of a region may lie off the other region
 WHOLE = 0.01  # share by which 360 degrees over the angle may differ from a whole number
 AREAS = 0.01  # share by which the areas of the regions may differ
+COVERED = 1e-3  # share of a cut, or of another condition's region, from which on that condition acts on the cut
 OPPOSITE = 0.99  # cosine of the angle between normals, on average, of an image and minus the other region
 
 
@@ -189,6 +191,7 @@ def _coupling(
             f"{condition.role}: the regions do not fit each other: a point of the first, turned by "
             f"{_degrees(turn, condition):.6g} degrees, lies {farthest:.3g} off the second"
         )
+    _demand_no_others(patches[0].problem.conditions, number, other, faces)
     first = Located(
         np.concatenate([face.patches[face.owners[own]] for face, own in zip(ones, rows, strict=True)]),
         np.concatenate([face.places[own] for face, own in zip(ones, rows, strict=True)]),
@@ -229,6 +232,25 @@ def _demand_disjoint(condition: Cyclic, number: int, other: int, faces: Sequence
     """Raise ValueError where the two regions share a part of the boundary."""
     if any((face.holds(number) & face.holds(other)).any() for face in faces):
         raise ValueError(f"{condition.role}: the two regions overlap: give the two cuts of a sector")
+
+
+def _demand_no_others(conditions: Sequence[Condition], number: int, other: int, faces: Sequence[WeakFace]) -> None:
+    """Raise ValueError where another condition acts on a cut: inside of the whole body nothing acts."""
+    for i, condition in enumerate(conditions):
+        for cut in (number, other) if i not in (number, other) else ():
+            shared, *whole = (_area(faces, *both) for both in ((cut, i), (cut,), (i,)))
+            if shared > COVERED * min(whole):
+                region, at = str(condition.region), conditions[cut].region
+                region = f"({region})" if " or " in region else region
+                raise ValueError(
+                    f"{condition.role} acts on a cut of {conditions[number].role}, where the whole body goes on: "
+                    f"write '{region} and not ({at})'"
+                )
+
+
+def _area(faces: Sequence[WeakFace], *conditions: int) -> float:
+    """Return the area on which all of some conditions hold."""
+    return float(sum(face.weights[np.all([face.holds(i) for i in conditions], axis=0)].sum() for face in faces))
 
 
 def _demand_alike(

@@ -246,6 +246,10 @@ class BoundaryValueProblem:
         own = tuple(one.nominal() if shares_out(one) else one for one in self.conditions)
         return copy(self)._assign(conditions=own)
 
+    def with_conditions(self, conditions: Sequence[Condition]) -> Self:
+        """Return the same problem with other conditions on regions, whose data are parsed."""
+        return copy(self)._assign(conditions=tuple(conditions))
+
     def _of(self, face: str) -> Condition | None:
         """Return the condition of a whole face; None where regions have the data."""
         return next((one for one in self.faces if face in one.faces), None)

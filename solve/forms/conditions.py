@@ -17,6 +17,7 @@ from .condition import Condition as Condition
 from .coupled import Cyclic
 from .general_conditions import Exchange, Flux, Robin, Value
 from .region import PATCH_FACE, Region, Regions, regions_of
+from .rigid import Rigid
 from .supports import Fix, Foundation, Roller, Spring, Symmetry, TotalSpring, Turn
 from .total_loads import Bearing, Moment, RemoteForce, SharedOut, TotalForce
 
@@ -32,6 +33,7 @@ __all__ = [
     "Moment",
     "Pressure",
     "RemoteForce",
+    "Rigid",
     "Robin",
     "Roller",
     "Spring",
@@ -47,7 +49,7 @@ OnFaces = Mapping[str, Any]
 
 KINDS: dict[str, type[Condition]] = {kind.option: kind for kind in map(globals().__getitem__, __all__)}
 OF_SCALARS = {"value": Value, "inflow": Flux, "exchange": Exchange}  # by keyword; those of Poisson and Problem
-STATED_BY_POINT = (Fix, Roller, Symmetry, Load, Pressure, Spring, Foundation, Turn, Hydrostatic)
+STATED_BY_POINT = (Fix, Roller, Symmetry, Load, Pressure, Spring, Foundation, Turn, Rigid, Hydrostatic)
 STATED_IN_TOTAL = (TotalForce, Moment, RemoteForce, Bearing, TotalSpring)
 OF_BODIES: dict[str, type[Condition]] = {kind.option: kind for kind in (*STATED_BY_POINT, *STATED_IN_TOTAL)}
 

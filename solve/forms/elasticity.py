@@ -66,7 +66,7 @@ class Elasticity(LawWithData):
     conditions : sequence of conditions such as Fix or Load, optional
         Supports and loads on regions of the boundary. Where a region is given, the rest of the boundary is free, or has
         the traction of `exact`; `displacement` and `traction` are left out then.
-    fix, roller, symmetry, turn, spring, total_spring, foundation : dict of region to data, optional
+    fix, roller, symmetry, turn, rigid, spring, total_spring, foundation : dict of region to data, optional
         Short forms of the supports of these names, such as `spring={"u0": 50}`; also regions alone, `fix="u0"`.
     load, pressure, hydrostatic, total_force, moment, remote_force, bearing : dict of region to data, optional
         Short forms of the loads of these names, such as `total_force={"u1": (0, 0, -500)}`. Data with a point are a
@@ -126,6 +126,7 @@ class Elasticity(LawWithData):
     load: GivenRegions | None = None
     pressure: GivenRegions | None = None
     turn: GivenRegions | None = None
+    rigid: GivenRegions | None = None
     spring: GivenRegions | None = None
     total_spring: GivenRegions | None = None
     foundation: GivenRegions | None = None
