@@ -5,7 +5,7 @@ RUN := .venv/.run
 DEV := .venv/.dev
 INSTALL := $(BIN)/python -m pip install -c constraints.txt
 
-.PHONY: setup setup-dev demo docs test lint validate stress fuzz audit disturbed
+.PHONY: setup setup-dev demo docs test suite lint validate stress fuzz audit disturbed
 
 setup: $(RUN)
 
@@ -37,7 +37,11 @@ docs: $(DEV)
 	$(BIN)/python -P docs/ways_table.py
 	OMP_NUM_THREADS=1 $(BIN)/python -P -m sphinx -W --keep-going -b html docs docs/_build/html
 
-test: lint
+# Both at once: checkers of code use one core.
+test: $(DEV)
+	$(MAKE) --jobs 2 lint suite
+
+suite: $(DEV)
 	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder
 
 lint: $(DEV)

@@ -16,6 +16,7 @@ from parameterize.spline.spline_stack import SplineStack
 
 from .field import FieldOnBody, Points, SplineField
 from .forms.boundary_value_problem import BoundaryValueProblem
+from .forms.hooke import Hooke
 
 OF_PATCHES = {"prefix", "data", "faces", "conditions", "dirichlet"}  # of problems whose law may yet be the same
 
@@ -108,7 +109,7 @@ def _divided(
 
 
 def _laws(problems: Sequence[BoundaryValueProblem | None]) -> Iterator[int]:
-    """Yield the number of the law of each problem: laws are the same with the same numbers and the same other parts.
+    """Yield the number of the law of each problem: laws are the same with equal numbers, laws of Hooke and other parts.
 
     A datum that is a field is another one on each patch.
     """
@@ -118,7 +119,7 @@ def _laws(problems: Sequence[BoundaryValueProblem | None]) -> Iterator[int]:
         parts = () if problem is None else _parts(problem)
         identity = tuple(map(id, parts))
         if identity not in known:
-            law = tuple(part if isinstance(part, Real) else id(part) for part in parts)
+            law = tuple(part if isinstance(part, Real | Hooke) else id(part) for part in parts)
             known[identity] = numbers.setdefault(law, len(numbers))
         yield known[identity]
 

@@ -38,7 +38,8 @@ FREE = 1e-9  # share of the largest stiffness against motions of regions, below 
 
 def has_rigid(problem: BoundaryValueProblem) -> bool:
     """Return whether a problem has rigid regions whose motion is unknown."""
-    return any(isinstance(one, Rigid) and one.motion is None for one in problem.conditions)
+    is_problem = isinstance(problem, BoundaryValueProblem)
+    return is_problem and any(isinstance(one, Rigid) and one.motion is None for one in problem.conditions)
 
 
 def _first(problem: BoundaryValueProblem) -> Condition:

@@ -39,8 +39,8 @@ def prepared(
     body: Body, problem: BoundaryValueProblem, options: SolveOptions
 ) -> tuple[BoundaryValueProblem, list[PatchProblem]]:
     """Check body and problem; return the problem placed in the body, and the problem on each patch."""
-    demand_known_motions(problem)
     placed, patches = on_patches(body, problem, options)
+    demand_known_motions(problem)
     if all(any(part.stop <= part.start for part in patch.space.free) for patch in patches):
         raise ValueError(
             f"degree {patches[0].space.degrees} leaves no unknown inside the volume: raise refine or degree"

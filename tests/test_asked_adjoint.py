@@ -73,6 +73,7 @@ def test_values_on_faces_are_given() -> None:
     assert system.load @ system.vector(z) == pytest.approx(value, rel=1e-8)
 
 
+@pytest.mark.slow
 def test_mixed_adjoints_are_symmetric() -> None:
     system = discretize(_rod(), PROBLEMS["mixed"])
     assert isinstance(system, MixedSystem)

@@ -47,6 +47,7 @@ def test_a_stress_at_a_singular_place_says_so(bent):
     assert "within 2 spans of the rim of fix 'u0', where it is infinite" in made("von_mises at (0, 0, 0.5)", bent).said
 
 
+@pytest.mark.slow
 def test_another_solution_has_the_same_radius(bent):
     asked = made("von_mises max", bent)
     finer = iga_nn.solve(ROD, HELD, degree=4)

@@ -47,6 +47,7 @@ def test_an_interval_holds_the_energy_at_a_reentrant_edge(degree):
         assert answer.upper - answer.value < 3.0 * abs(truth - answer.value)
 
 
+@pytest.mark.slow
 def test_ends_are_not_divided_where_this_costs_much(monkeypatch):
     monkeypatch.setattr(raised, "FEW", 0)
     bar = Elasticity(fix="p0_u0", load={"p1_u1": (0, 0, -1)})

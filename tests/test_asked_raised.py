@@ -58,6 +58,7 @@ def test_the_raised_solution_has_what_a_cubic_solution_lacks():
     assert after < 0.02 * before
 
 
+@pytest.mark.slow
 def test_pressures_are_raised_too():
     bar = Elasticity(poisson_ratio=0.49, fix="u0", load={"u1": (0, 0, -1)})
     volume = iga_nn.BSplineVolume.from_function(lambda u, v, w: (2 * u, v, w), (5, 4, 4), 2)

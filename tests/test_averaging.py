@@ -90,6 +90,7 @@ def test_constant_gradients_stay(body):
     )
 
 
+@pytest.mark.slow
 def test_two_materials_one_cube_and_kinks_keep_their_own_gradients(body):
     halves = Body.from_patches(
         [BSplineVolume.from_function(lambda u, v, w, a=a: (u + a, v, w), 4) for a in (0, 1)], solids=["a", "b"]

@@ -93,6 +93,7 @@ def states(folder: Path) -> dict[str, str]:
 FINISHED = ("certified", "not certified", "not the part")  # so short a training need not be any good
 
 
+@pytest.mark.slow
 def test_a_batch_survives_what_happens_to_it(tmp_path):
     """Interrupted, then a worker killed, out of memory, a refused surface."""
     parts = tmp_path / "parts"

@@ -1,10 +1,12 @@
 from dataclasses import replace
 
+import pytest
 from example_files import load
 
 benchmark = load("benchmarks/effectivity")
 
 
+@pytest.mark.slow
 def test_intervals_are_measured_beside_finer_solutions(capsys, monkeypatch):
     case = replace(benchmark.CASES["hexahedra, Poisson"], ask=("u at (0.25, 0.25, 0.2)", "energy"), refine=0)
     monkeypatch.setattr(benchmark, "CASES", {"hexahedra": case})

@@ -199,8 +199,10 @@ def test_what_went_on_from_a_checkpoint_has_no_time(formula):
 
 
 def test_a_solve_that_does_not_converge_is_a_status(formula, monkeypatch):
+    unlimited = solve.solve_with
+
     def stopped(volume, problem, options):
-        return solve.solve_with(volume, problem, replace(options, max_iterations=1))
+        return unlimited(volume, problem, replace(options, max_iterations=1))
 
     monkeypatch.setattr("solve.solve_with", stopped)
     assert g1.main(formula) == 1

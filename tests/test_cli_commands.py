@@ -119,8 +119,10 @@ def test_a_folded_map_is_solved_if_asked_alone_with_a_warning_and_exit_code_3(fo
 
 
 def test_solve_that_does_not_converge_is_exit_code_4(monkeypatch, in_folder):
+    unlimited = solve.solve_with
+
     def stopped(volume, problem, options):
-        return solve.solve_with(volume, problem, replace(options, max_iterations=1))
+        return unlimited(volume, problem, replace(options, max_iterations=1))
 
     monkeypatch.setattr("solve.solve_with", stopped)
     benchmark_volume(6).save("volume.npz")
@@ -395,7 +397,7 @@ def test_fetch_takes_the_model_from_the_data_folder(in_folder, monkeypatch):
         (["study", "good.npz", "--exact", "-x"], "--exact=-x"),
         (["study", "missing.npz"], "missing.npz"),
         (["study", "elasticity", "missing.npz"], "missing.npz: no such file"),
-        (["solve", "elasticity", "good.npz"], "no load is given: --load"),
+        (["solve", "elasticity", "good.npz"], "no load is given: --total-force"),
         (["solve", "elasticity", "good.npz", "--exact", "x;y"], "--exact 'x;y': write three formulas"),
         (["solve", "elasticity", "good.npz", "--body-force", "1"], "--body-force '1': write three formulas"),
         (["solve", "elasticity", "good.npz", "--exact", "x;y;z", "--poisson-ratio", "0.5"], "poisson_ratio"),

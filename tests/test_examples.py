@@ -47,6 +47,7 @@ def test_first_run(capsys, tmp_path):
     assert shown(picture)
 
 
+@pytest.mark.slow
 def test_own_mesh(formula_map, tmp_path, capsys):
     assert shown(load("own_mesh").main(out=tmp_path / "sample"))
     out = capsys.readouterr().out
@@ -108,6 +109,7 @@ def test_bracket_balances_its_load_and_is_near_beam_theory(tmp_path, capsys):
     assert numbers(out, r"(\S+)\), fix") == [-1000.0] and numbers(out, r"(\S+)\) \(balanced") == [1000.0]
 
 
+@pytest.mark.slow
 def test_rational_ring_is_lames(tmp_path, capsys):
     assert shown(load("rational_ring").main(out=tmp_path))
     out = capsys.readouterr().out
@@ -134,6 +136,7 @@ def test_graded_spans_bring_the_rate_back(tmp_path, capsys):
     assert "accuracy 1 % reached" in out
 
 
+@pytest.mark.slow
 def test_a_plate_with_a_hole_has_three_times_the_stress(tmp_path, capsys):
     assert shown(load("plate_with_hole").main(out=tmp_path))
     top, side = re.findall(r"(-?[\d.]+) at its", capsys.readouterr().out)
@@ -255,6 +258,7 @@ def last_value(source, space):
     return eval(compile(ast.Expression(last.value), "notebook", "eval"), space)
 
 
+@pytest.mark.slow
 def test_convergence_rates(tmp_path, capsys, monkeypatch):
     """Without degree 6, for which kernels would be compiled that no other test needs."""
     script = load("convergence")

@@ -213,6 +213,7 @@ def test_a_study_draws_relative_errors_beside_absolute_ones():
 
 
 @pytest.mark.pictures
+@pytest.mark.slow
 def test_plots_of_curves_are_also_written_as_pdf(in_folder, formula_training, monkeypatch):
     formula_training()
     monkeypatch.setattr(rendering, "can_draw", lambda: False)  # this is about curves

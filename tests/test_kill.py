@@ -33,6 +33,7 @@ def test_killed_at_thirty_moments_and_resumed():
     killed("killing.py", "--moments", "30")
 
 
+@pytest.mark.slow
 def test_killed_once_blocks_are_laid_and_resumed():
     killed("killing_stages.py", "--bodies", "L", "shaft")
 

@@ -246,7 +246,7 @@ async def kept(tab):
     await tab.value(RELOADED)
     await tab.until("window.reloaded === undefined && document.querySelector('form [name=source]')?.value === 'x*'")
     heading, values, chosen = await tab.value(SHOWN)
-    assert heading == "3 · my ball.obj" and values == ["1+X*X", "0", "", "x*", ""] and len(chosen) == 1
+    assert heading == "3 · my ball.obj" and values == ["1+X*X", "", "0", "", "x*", ""] and len(chosen) == 1
     await tab.call("Emulation.setDeviceMetricsOverride", width=400, height=900, deviceScaleFactor=1, mobile=False)
     assert await tab.value("document.documentElement.scrollWidth") <= 400
 

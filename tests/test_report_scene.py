@@ -575,6 +575,7 @@ def test_a_body_cut_open_shows_what_lies_behind(in_browser, rod, tmp_path):
     assert complaints == [] and 0.3 * sum(whole.values()) < sum(cut.values()) < sum(whole.values())
 
 
+@pytest.mark.slow
 def test_modes_of_a_body_are_frames(rod):
     body, _ = rod
     held = solve.Elasticity(fix="p0_u0", load={"p2_u1": (0, 0, 1)})

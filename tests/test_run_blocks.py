@@ -35,6 +35,7 @@ def undisturbed(ring, options):
     return parameterize(ring, **options)
 
 
+@pytest.mark.slow
 def test_a_ring_becomes_certified_blocks_in_its_own_units(ring, undisturbed):
     assert isinstance(undisturbed.volume, Body) and undisturbed.origin == "blocks"
     assert undisturbed.certificate.verdict == "certified" and undisturbed.quality.boundary_check.injective

@@ -162,11 +162,12 @@ def test_a_solve_keeps_its_levels_and_is_not_replaced_unasked(ending, in_folder,
     benchmark_volume(3).save("map.npz")
     ending(KeyboardInterrupt())
     assert main(["solve", "poisson", "map.npz", *MESHES, "--out", "out"]) == 130
-    assert capsys.readouterr().err.splitlines()[-1] == "iga-nn: interrupted; 2 levels done, in out/report.json"
+    said = "the same command with --resume continues from the levels that are solved, and does again what came after"
+    assert capsys.readouterr().err.splitlines()[-1] == f"iga-nn: interrupted; {said}"
     assert len(report_of("out")["poisson"]["levels"]) == 2 and Path("out/solution.vtu").is_file()
     ending()
     assert main(["solve", "poisson", "map.npz", *MESHES, "--out", "out"]) == 2
-    assert "holds levels of an interrupted solve" in capsys.readouterr().err
+    assert "holds an interrupted run; --resume continues it" in capsys.readouterr().err
     assert main(["solve", "poisson", "map.npz", *MESHES, "--out", "out", "--force"]) == 0
 
 

@@ -77,6 +77,8 @@ def export(
         raise InputError(f"samples {samples}: must be 1 or larger")
     if solution is not None and not chosen.holds_solution:
         raise InputError(f"format {to!r}: has no place for a solution: leave --solution out")
+    if volume == "":
+        raise InputError("no volume is named: give a volume.npz, or the folder of a run")
     source, beside = _run(Path(volume))
     given = beside if solution is None and chosen.holds_solution else None if solution is None else Path(solution)
     stem = Path(volume).resolve().name if Path(volume).is_dir() else source.stem
