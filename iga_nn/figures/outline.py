@@ -21,7 +21,7 @@ SAME = 1e-6  # of the box's diagonal: borders of two faces that are nearer are o
 
 
 @dataclass(frozen=True, eq=False)
-class Outline:
+class SharpOutline:
     """Hold the sharp edges of a body and the smooth faces between them.
 
     edges: (e, 2), the ends of short pieces, as numbers of samples on the outer faces. faces: (f,), the number of the
@@ -33,12 +33,12 @@ class Outline:
 
 
 @remembered
-def outline_of(body: BodyLike) -> Outline:
+def outline_of(body: BodyLike) -> SharpOutline:
     """Return the outline of a body by the samples that its figures have on outer faces."""
     return outline(body, points_of(body).on(outer_faces(body)))
 
 
-def outline(body: BodyLike, points: Array) -> Outline:
+def outline(body: BodyLike, points: Array) -> SharpOutline:
     """Return the outline by samples (f, m, m, 3) on the outer faces of a body."""
     count, m, borders = len(points), points.shape[1], _borders(points.shape[1])
     normals = outward(body, points)
@@ -62,7 +62,7 @@ def outline(body: BodyLike, points: Array) -> Outline:
     smooth = sharp.mean(axis=1) < 0.5
     rows, columns = first[smooth] // 4, second[smooth] // 4
     joined = coo_matrix((np.ones(len(rows)), (rows, columns)), shape=(count, count))
-    return Outline(pieces, connected_components(joined, directed=False)[1].astype(np.int64))
+    return SharpOutline(pieces, connected_components(joined, directed=False)[1].astype(np.int64))
 
 
 def outward(body: BodyLike, points: Array) -> Array:

@@ -26,7 +26,7 @@ from solve.patch_system import PatchProblem
 from ..errors import InputError, input_errors
 from .element_loads import Films, nodal_loads, problems_on
 from .element_proof import proved
-from .element_shapes import SHAPES, Shape
+from .element_shapes import SHAPES, ElementShape
 from .element_supports import Held, faces_of_regions, held_nodes
 from .elements import Elements, cut
 
@@ -55,7 +55,7 @@ class Deck:
     """
 
     elements: Elements
-    shape: Shape
+    shape: ElementShape
     numbers: IntArray
     problem: BoundaryValueProblem | None
     forces: Array

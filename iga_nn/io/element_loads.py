@@ -27,7 +27,7 @@ from solve.options import SolveOptions
 from solve.patch_system import PatchProblem
 from solve.preparation import on_patches
 
-from .element_shapes import Shape
+from .element_shapes import ElementShape
 from .elements import Alike, Elements, alike_patches, chunks
 
 GAUSS = 4  # points a direction on an element
@@ -35,7 +35,7 @@ AT_ONCE = 500  # patches
 
 
 @dataclass(frozen=True, eq=False)
-class Flow:
+class PointLoads:
     """Hold loads at points: patches (m,), parameters (m, 3), weights (m,) in space, forces (m, c) and factors (m,).
 
     forces: load times weight. factors: of u in the flux, not times the weight; zero but for exchanges.
@@ -64,7 +64,7 @@ def problems_on(elements: Elements, problem: BoundaryValueProblem) -> tuple[Boun
 
 
 def nodal_loads(
-    elements: Elements, shape: Shape, patches: Sequence[PatchProblem], components: int
+    elements: Elements, shape: ElementShape, patches: Sequence[PatchProblem], components: int
 ) -> tuple[Array, Films]:
     """Return the forces (n, c) at all nodes, and the films of exchanges. Raises ValueError as a solve."""
     forces = np.zeros((len(elements.points), components))
@@ -79,7 +79,9 @@ def nodal_loads(
     return forces, _of_shape(elements, shape, films)
 
 
-def _add(forces: Array, elements: Elements, shape: Shape, inside: IntArray, parameters: Array, loads: Array) -> None:
+def _add(
+    forces: Array, elements: Elements, shape: ElementShape, inside: IntArray, parameters: Array, loads: Array
+) -> None:
     """Add loads (m, c) at points in elements `inside` (m,) to the forces at nodes."""
     for part in chunks(len(inside), 100_000):
         own = inside[part]
@@ -90,7 +92,7 @@ def _add(forces: Array, elements: Elements, shape: Shape, inside: IntArray, para
             forces[:, component] += np.bincount(nodes.ravel(), share.ravel(), len(forces))
 
 
-def _flows(elements: Elements, patches: Sequence[PatchProblem]) -> Iterator[Flow]:
+def _flows(elements: Elements, patches: Sequence[PatchProblem]) -> Iterator[PointLoads]:
     """Yield the loads: of regions, of whole faces, and per volume."""
     if patches[0].problem.conditions:
         yield from _of_regions(patches)
@@ -98,7 +100,7 @@ def _flows(elements: Elements, patches: Sequence[PatchProblem]) -> Iterator[Flow
     yield from _of_volume(elements, patches)
 
 
-def _of_regions(patches: Sequence[PatchProblem]) -> Iterator[Flow]:
+def _of_regions(patches: Sequence[PatchProblem]) -> Iterator[PointLoads]:
     first, same = patches[0], [patch.problem.in_volume for patch in patches]
     if not first.problem.has_totals:
         faces = weak_faces(patches, same)
@@ -108,10 +110,10 @@ def _of_regions(patches: Sequence[PatchProblem]) -> Iterator[Flow]:
         faces = [renewed(face, patches[face.patches[0]].problem.sharing(conditions)) for face in faces]
     for face in faces:
         forces = (face.loads * face.weights).T
-        yield Flow(face.patches[face.owners], face.places, face.weights, forces, face.factor[0, 0])
+        yield PointLoads(face.patches[face.owners], face.places, face.weights, forces, face.factor[0, 0])
 
 
-def _of_faces(elements: Elements, patches: Sequence[PatchProblem]) -> Iterator[Flow]:
+def _of_faces(elements: Elements, patches: Sequence[PatchProblem]) -> Iterator[PointLoads]:
     for group in elements.body.groups:
         for place, number in enumerate(group.numbers.tolist()):
             patch = patches[number]
@@ -124,16 +126,16 @@ def _of_faces(elements: Elements, patches: Sequence[PatchProblem]) -> Iterator[F
                 weights = rule.area.ravel()
                 forces = (given.reshape(len(given), -1) * weights).T
                 factors = np.zeros(len(grid)) if alpha is None else alpha.ravel()
-                yield Flow(np.full(len(grid), number), grid, weights, forces, factors)
+                yield PointLoads(np.full(len(grid), number), grid, weights, forces, factors)
 
 
-def _of_volume(elements: Elements, patches: Sequence[PatchProblem]) -> Iterator[Flow]:
+def _of_volume(elements: Elements, patches: Sequence[PatchProblem]) -> Iterator[PointLoads]:
     for some in alike_patches(elements.body, elements.grading):
         for part in chunks(len(some.places), AT_ONCE):
             yield from _of_alike(elements, some, part, patches)
 
 
-def _of_alike(elements: Elements, some: Alike, part: slice, patches: Sequence[PatchProblem]) -> Iterator[Flow]:
+def _of_alike(elements: Elements, some: Alike, part: slice, patches: Sequence[PatchProblem]) -> Iterator[PointLoads]:
     t, weights = np.polynomial.legendre.leggauss(GAUSS)
     u, v, w = rows = [(row[:-1, None] + np.diff(row)[:, None] * (0.5 + 0.5 * t)).ravel() for row in some.cuts]
     sizes = [(np.diff(row)[:, None] * 0.5 * weights).ravel() for row in some.cuts]
@@ -152,7 +154,7 @@ def _of_alike(elements: Elements, some: Alike, part: slice, patches: Sequence[Pa
             source = patches[number].problem.source_at(points)
             own = measure[place].ravel()
             forces = (source.reshape(len(source), -1) * own).T
-            yield Flow(np.full(len(own), number), grid, own, forces, np.zeros(len(own)))
+            yield PointLoads(np.full(len(own), number), grid, own, forces, np.zeros(len(own)))
 
 
 def _is_free(problem: BoundaryValueProblem) -> bool:
@@ -161,7 +163,7 @@ def _is_free(problem: BoundaryValueProblem) -> bool:
     return source is not None and source.is_zero
 
 
-def _film(elements: Elements, flow: Flow, inside: IntArray, points: IntArray) -> tuple[IntArray, Array]:
+def _film(elements: Elements, flow: PointLoads, inside: IntArray, points: IntArray) -> tuple[IntArray, Array]:
     """Return the faces (f, 2), element and own face, of some points of a flow, and their integrals (f, 2).
 
     The integrals are those of the factor, and of the factor times the value outside.
@@ -176,7 +178,7 @@ def _film(elements: Elements, flow: Flow, inside: IntArray, points: IntArray) ->
     return rows.astype(np.int64), np.asarray(sums)
 
 
-def _of_shape(elements: Elements, shape: Shape, films: Sequence[tuple[IntArray, Array]]) -> Films:
+def _of_shape(elements: Elements, shape: ElementShape, films: Sequence[tuple[IntArray, Array]]) -> Films:
     """Return the films of all parts, with coefficients that have the integrals on the faces as they are written."""
     none = np.empty(0)
     if not films:
@@ -189,7 +191,7 @@ def _of_shape(elements: Elements, shape: Shape, films: Sequence[tuple[IntArray, 
     return Films(owners, faces, sums[:, 0] / areas, sums[:, 1] / sums[:, 0])
 
 
-def face_areas(elements: Elements, shape: Shape, owners: IntArray, faces: IntArray) -> Array:
+def face_areas(elements: Elements, shape: ElementShape, owners: IntArray, faces: IntArray) -> Array:
     """Return the areas (f,) of faces of elements as their shape has them; faces: the elements' own."""
     q = shape.degree
     areas = np.empty(len(owners))

@@ -18,7 +18,7 @@ from parameterize.spline.patch_groups import PatchGroup
 from parameterize.spline.volume import BSplineVolume
 
 from ..errors import InputError
-from .element_shapes import Shape
+from .element_shapes import ElementShape
 from .elements import Elements
 
 log = logging.getLogger(__name__)
@@ -28,7 +28,7 @@ DEPTH = 6  # how often a doubtful element is cut in eight for its proof
 MOST = 2_000_000  # elements: halving that leads to more is refused
 
 
-def proved(elements: Elements, shape: Shape) -> tuple[Elements, int]:
+def proved(elements: Elements, shape: ElementShape) -> tuple[Elements, int]:
     """Return elements, finer where needed, of which det J > 0 is proved as the shape has it; and how many were halved.
 
     Raises InputError where elements are still folded after ROUNDS halvings.
@@ -50,7 +50,7 @@ def proved(elements: Elements, shape: Shape) -> tuple[Elements, int]:
     )
 
 
-def unproved(points: Array, cells: IntArray, shape: Shape) -> IntArray:
+def unproved(points: Array, cells: IntArray, shape: ElementShape) -> IntArray:
     """Return the elements of which det J > 0 on the whole is not proved.
 
     points: (n, 3). cells: (e, k), the nodes of each in the shape's order.

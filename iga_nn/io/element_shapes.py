@@ -19,7 +19,7 @@ EDGES = ((0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4), (0, 4),
 
 
 @dataclass(frozen=True, eq=False)
-class Shape:
+class ElementShape:
     """Hold an element's name in the files, the degree q of its lattice, and its nodes.
 
     nodes: (k, 3), places in the lattice from 0 to q, in the order of the files.
@@ -64,7 +64,7 @@ def _with_edges() -> IntArray:
 
 
 @dataclass(frozen=True, eq=False)
-class Full(Shape):
+class Full(ElementShape):
     """Hold an element with all nodes of its lattice: the map of degree q through them."""
 
     def functions(self, local: Array) -> Array:
@@ -108,9 +108,9 @@ def _of_gmsh(degree: int) -> IntArray:
 GMSH_EDGES = ((0, 1), (0, 3), (0, 4), (1, 2), (1, 5), (2, 3), (2, 6), (3, 7), (4, 5), (4, 7), (5, 6), (6, 7))
 GMSH_FACES = ((0, 3, 2, 1), (0, 1, 5, 4), (0, 4, 7, 3), (1, 2, 6, 5), (2, 3, 7, 6), (4, 5, 6, 7))
 
-C3D8 = Shape("C3D8", 1, np.array(CORNERS))
-C3D20 = Shape("C3D20", 2, _with_edges())
-C3D20R = Shape("C3D20R", 2, _with_edges())
+C3D8 = ElementShape("C3D8", 1, np.array(CORNERS))
+C3D20 = ElementShape("C3D20", 2, _with_edges())
+C3D20R = ElementShape("C3D20R", 2, _with_edges())
 SHAPES = {shape.name: shape for shape in (C3D20, C3D20R, C3D8)}
 HEX27 = Full("hex27", 2, _of_gmsh(2))
 HEX64 = Full("hex64", 3, _of_gmsh(3))

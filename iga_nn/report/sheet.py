@@ -20,7 +20,7 @@ Row = tuple[str, ...]
 
 
 @dataclass(frozen=True)
-class Sheet:
+class SignedSheet:
     """Hold the tables of a sheet, each with its head first.
 
     subject: the part's file and its hash, and the volume's. proof: what is proved of the map, and how near it is to the
@@ -36,10 +36,10 @@ class Sheet:
     notes: list[str]
 
 
-def sheet_of(report: Report) -> Sheet:
+def sheet_of(report: Report) -> SignedSheet:
     """Return the sheet of a finished report."""
     problem, conditions = _cut(statement_of(report)), _cut(regions_of(report))
-    return Sheet(_subject(report), _proof(report), problem, conditions, _results(report), _notes(report))
+    return SignedSheet(_subject(report), _proof(report), problem, conditions, _results(report), _notes(report))
 
 
 def _subject(report: Report) -> list[Row]:

@@ -92,7 +92,7 @@ def check_boundary(body: BodyLike, *, max_depth: int = 24) -> BoundaryCheck:
     return BoundaryCheck(None if found is None else not found, None, 0, found)
 
 
-class Surface(Protocol):
+class SearchedFaces(Protocol):
     """The faces that pieces are parts of, as a search for a common point needs them: by number, with parameters."""
 
     def points(self, faces: IntArray, where: Array) -> Array:
@@ -120,7 +120,7 @@ class Rest:
     met: tuple[IntArray, tuple[Array, Array]] | None = None
 
 
-def settle(surface: Surface, pieces: Pieces, error: float, max_depth: int) -> Rest:
+def settle(surface: SearchedFaces, pieces: Pieces, error: float, max_depth: int) -> Rest:
     """Prove that pieces meet only where they are joined, cutting them at most `max_depth` times in four.
 
     error: a bound of the rounding error of a control point's coordinate.
@@ -181,7 +181,7 @@ def _meeting(body: Body, patches: IntArray, where: tuple[Array, Array]) -> Meeti
 
 
 def _search(
-    surface: Surface, pieces: Pieces, pairs: IntArray, error: float
+    surface: SearchedFaces, pieces: Pieces, pairs: IntArray, error: float
 ) -> tuple[IntArray, tuple[Array, Array]] | None:
     """Return two parameters of a common point of pieces that do not touch, and the numbers (2,) of their faces.
 
@@ -215,7 +215,7 @@ def _search(
     return np.array([faces[0][best], faces[1][best]]), (where[0][best], where[1][best])
 
 
-def _slopes(surface: Surface, faces: list[IntArray], where: list[Array], tangents: list[IntArray]) -> Array:
+def _slopes(surface: SearchedFaces, faces: list[IntArray], where: list[Array], tangents: list[IntArray]) -> Array:
     """Return the derivative (k, 3, 4) of F(p) - F(q) in the two free parameters of each."""
     of_p, of_q = (
         np.take_along_axis(surface.jacobian(faces[k], where[k]), tangents[k][:, None], axis=2) for k in range(2)

@@ -16,7 +16,7 @@ from ..certificate.patch_proofs import Pieces
 from ..spline.bernstein import binomials, elevation
 from ..spline.body import numbers_of_classes
 from .bezier import bernstein_of_values, net_matrix, simplex_bernstein, simplex_indices
-from .faces import Faces, face_kinds
+from .faces import ElementFaces, face_kinds
 from .kinds import ElementKind
 from .mesh import VolumeMesh
 
@@ -96,7 +96,7 @@ class Quadrilaterals:
         return Pieces(0, QuadrilateralNames(self.corners), np.arange(count), axes, np.zeros((count, 3), int), self.nets)
 
 
-def quadrilaterals(mesh: VolumeMesh, faces: Faces, labels: IntArray, points: Array) -> Quadrilaterals:
+def quadrilaterals(mesh: VolumeMesh, faces: ElementFaces, labels: IntArray, points: Array) -> Quadrilaterals:
     """Return the boundary of a mesh. labels: of its points; points: (n, 3), scaled to magnitude 1 near the origin."""
     degree = max(max(block.kind.degrees) for block in mesh.blocks)
     nets, corners, owners = [], [], []

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..arrays import Array, IntArray
 from .evaluation import jacobian_at
-from .faces import LOOPS, Faces
+from .faces import LOOPS, ElementFaces
 from .mesh import VolumeMesh
 
 _APART = 1e-6  # angle between two sectors
@@ -31,7 +31,7 @@ class Touching:
     row: int
 
 
-def around(mesh: VolumeMesh, faces: Faces, crowded: IntArray) -> Touching:
+def around(mesh: VolumeMesh, faces: ElementFaces, crowded: IntArray) -> Touching:
     """Return what is known around edges, given by the labels (k, 2) of their ends, ascending."""
     rows_of = _faces_at(faces, crowded)
     links: list[tuple[int, int]] = []
@@ -47,7 +47,7 @@ def around(mesh: VolumeMesh, faces: Faces, crowded: IntArray) -> Touching:
     return Touching(np.array(links), None if doubtful is not None else True, doubtful if doubtful is not None else -1)
 
 
-def _faces_at(faces: Faces, edges: IntArray) -> list[list[int]]:
+def _faces_at(faces: ElementFaces, edges: IntArray) -> list[list[int]]:
     """Return for each edge the rows of all faces that have it."""
     corners = faces.corners
     last = np.where(corners[:, 3] < 0, corners[:, 0], corners[:, 3])
@@ -64,7 +64,9 @@ def _faces_at(faces: Faces, edges: IntArray) -> list[list[int]]:
     return rows_of
 
 
-def _sectors(mesh: VolumeMesh, faces: Faces, ends: IntArray, rows: list[int]) -> list[tuple[int, int, float, float]]:
+def _sectors(
+    mesh: VolumeMesh, faces: ElementFaces, ends: IntArray, rows: list[int]
+) -> list[tuple[int, int, float, float]]:
     """Return the sectors around an edge: first and last face of the boundary, the angle where it begins, its length."""
     partner = {}
     for row in rows:
@@ -93,7 +95,9 @@ def _sectors(mesh: VolumeMesh, faces: Faces, ends: IntArray, rows: list[int]) ->
     return sectors
 
 
-def _directions(mesh: VolumeMesh, faces: Faces, ends: IntArray, rows: tuple[int, int]) -> tuple[list[Array], Array]:
+def _directions(
+    mesh: VolumeMesh, faces: ElementFaces, ends: IntArray, rows: tuple[int, int]
+) -> tuple[list[Array], Array]:
     """Return the directions (3,) from the middle of an edge into two faces of an element, and along the edge."""
     number = int(faces.blocks[rows[0]])
     block = mesh.blocks[number]

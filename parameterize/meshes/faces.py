@@ -73,7 +73,7 @@ def _turns(kind: ElementKind, face: int) -> tuple[IntArray, IntArray]:
 
 
 @dataclass(frozen=True, eq=False)
-class Faces:
+class ElementFaces:
     """All faces of a mesh.
 
     Attributes
@@ -108,7 +108,7 @@ class Faces:
         return np.asarray(self.others == -1)
 
 
-def faces_of(mesh: VolumeMesh, labels: IntArray) -> Faces:
+def faces_of(mesh: VolumeMesh, labels: IntArray) -> ElementFaces:
     """Return the faces of a mesh. labels: of its points, equal for points that are taken for one."""
     columns: list[list[IntArray]] = [[] for _ in range(5)]
     rows_of_nodes: list[IntArray] = []
@@ -133,7 +133,7 @@ def faces_of(mesh: VolumeMesh, labels: IntArray) -> Faces:
                 column.append(values)
     blocks, elements, faces, corners, _ = map(np.concatenate, columns)
     others, *defects = _paired(np.concatenate(rows_of_nodes))
-    return Faces(blocks, elements, faces, corners, others, *defects)
+    return ElementFaces(blocks, elements, faces, corners, others, *defects)
 
 
 def _way(corners: IntArray) -> IntArray:
@@ -169,7 +169,7 @@ def _paired(rows: IntArray) -> tuple[IntArray, IntArray, IntArray, IntArray]:
     return others, one_sided, crowded, unlike
 
 
-def unlike_edge(mesh: VolumeMesh, faces: Faces, labels: IntArray, outer: IntArray) -> int | None:
+def unlike_edge(mesh: VolumeMesh, faces: ElementFaces, labels: IntArray, outer: IntArray) -> int | None:
     """Return the row of a face of the boundary with an edge whose corner nodes, but not others, another edge has."""
     keys, nodes, owners = [], [], []
     widest = max(max(block.kind.degrees) for block in mesh.blocks) - 1

@@ -15,7 +15,7 @@ from ..certificate.boundary import settle
 from ..spline.body import numbers_of_classes
 from .boundary import DEPTH, Quadrilaterals, QuadrilateralSurface, edges_of, quadrilaterals, shells_of
 from .edges import around
-from .faces import Faces, faces_of, unlike_edge
+from .faces import ElementFaces, faces_of, unlike_edge
 from .inside import is_inside
 from .mesh import VolumeMesh
 
@@ -76,7 +76,7 @@ def check_overlap(mesh: VolumeMesh, sign: int, scaled: float = 0.0) -> OverlapCh
     return replace(_checked(mesh, sign, labels, faces), touching=_touching(mesh, faces, labels))
 
 
-def _nearly_same(mesh: VolumeMesh, labels: IntArray, faces: Faces) -> IntArray | None:
+def _nearly_same(mesh: VolumeMesh, labels: IntArray, faces: ElementFaces) -> IntArray | None:
     """Return labels (n,) that are equal for points of the boundary up to rounding in one place; None without such."""
     points = mesh.points
     corners = np.unique(faces.corners[faces.others < 0])
@@ -98,7 +98,7 @@ def _nearly_same(mesh: VolumeMesh, labels: IntArray, faces: Faces) -> IntArray |
     return near[labels]
 
 
-def _same_side(mesh: VolumeMesh, faces: Faces) -> OverlapCheck | None:
+def _same_side(mesh: VolumeMesh, faces: ElementFaces) -> OverlapCheck | None:
     """Return that elements overlap where two lie on the same side of a face."""
     rows = faces.one_sided if len(faces.one_sided) else faces.crowded
     if not len(rows):
@@ -121,7 +121,7 @@ def same_places(points: Array) -> IntArray:
     return labels
 
 
-def _touching(mesh: VolumeMesh, faces: Faces, labels: IntArray) -> int:
+def _touching(mesh: VolumeMesh, faces: ElementFaces, labels: IntArray) -> int:
     """Return how many pairs of glued faces have different nodes in the same places."""
     if np.array_equal(labels, np.arange(len(labels))):
         return 0
@@ -129,7 +129,7 @@ def _touching(mesh: VolumeMesh, faces: Faces, labels: IntArray) -> int:
     return int(np.count_nonzero((faces.others >= 0) & (by_nodes.others < 0))) // 2
 
 
-def _checked(mesh: VolumeMesh, sign: int, labels: IntArray, faces: Faces) -> OverlapCheck:
+def _checked(mesh: VolumeMesh, sign: int, labels: IntArray, faces: ElementFaces) -> OverlapCheck:
     if found := _same_side(mesh, faces):
         return found
     if len(faces.unlike):
@@ -159,7 +159,7 @@ def _checked(mesh: VolumeMesh, sign: int, labels: IntArray, faces: Faces) -> Ove
 
 def _unproved(
     mesh: VolumeMesh,
-    faces: Faces,
+    faces: ElementFaces,
     found: Quadrilaterals,
     pairs: IntArray,
     back: Callable[[Array], tuple[float, float, float]],
@@ -176,7 +176,7 @@ def _unproved(
 
 
 def _of_shells(
-    mesh: VolumeMesh, sign: int, faces: Faces, outer: IntArray, found: Quadrilaterals, local: Array
+    mesh: VolumeMesh, sign: int, faces: ElementFaces, outer: IntArray, found: Quadrilaterals, local: Array
 ) -> OverlapCheck:
     """Return whether shells, the connected parts of a boundary that does not meet itself, enclose a place twice."""
     ends, counts, edges = edges_of(faces.corners[outer])
@@ -218,7 +218,7 @@ def _of_shells(
 
 
 def _inside(
-    mesh: VolumeMesh, faces: Faces, local: Array, parts: IntArray, pieces: Quadrilaterals, rows: IntArray
+    mesh: VolumeMesh, faces: ElementFaces, local: Array, parts: IntArray, pieces: Quadrilaterals, rows: IntArray
 ) -> OverlapCheck | None:
     """Return that the part whose outward shell has faces (k,) lies inside of another one; None where it does not.
 
@@ -266,12 +266,12 @@ def _local(mesh: VolumeMesh) -> tuple[Array, Callable[[Array], tuple[float, floa
     return local, lambda point: _triple(np.ldexp(point, exponent) + middle)
 
 
-def _at(mesh: VolumeMesh, faces: Faces, row: int) -> tuple[tuple[int, ...], tuple[float, float, float]]:
+def _at(mesh: VolumeMesh, faces: ElementFaces, row: int) -> tuple[tuple[int, ...], tuple[float, float, float]]:
     """Return the number of the element of a face, and the face's middle."""
     return (int(mesh.numbers[faces.elements[row]]),), _middle(mesh, faces, row)
 
 
-def _middle(mesh: VolumeMesh, faces: Faces, row: int) -> tuple[float, float, float]:
+def _middle(mesh: VolumeMesh, faces: ElementFaces, row: int) -> tuple[float, float, float]:
     corners = faces.corners[row]
     return _triple(mesh.points[corners[corners >= 0]].mean(axis=0))
 
