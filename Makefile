@@ -57,7 +57,7 @@ disturbed: $(DEV)
 		$(BIN)/python -m pytest -n 2 --dist loadfile
 
 validate: $(DEV)
-	$(BIN)/python examples/validation.py
+	$(BIN)/python examples/benchmarks/validation.py
 	$(BIN)/python -m pytest -m slow
 
 # Takes some two to ten minutes a surface, where nothing certifies up to 40; goes on where it was interrupted.

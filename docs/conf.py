@@ -50,7 +50,7 @@ EXECUTED = (  # the others train for minutes: their pages show results that are 
     "l_shape", "nonlinear_conductivity", "own_law", "plate_with_hole", "pulled_ring", "rational_ring",
     "thermal_stress", "vibration",
 )  # fmt: skip
-TOOLS = ("common", "gallery", "validation")  # no examples of their own
+TOOLS = ("common", "gallery")  # no examples of their own
 sphinx_gallery_conf = {
     "examples_dirs": "../examples",
     "gallery_dirs": "gallery",

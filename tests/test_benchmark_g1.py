@@ -22,6 +22,7 @@ g1 = load("benchmarks/g1")
 DUCK = g1.Row(
     "duck",
     verdict="certified",
+    one_to_one="yes",
     control_points="30 x 30 x 30",
     det_lower_bound=0.0123,
     arap_mean_unit_volume=0.341,  # exactly the paper's
@@ -80,38 +81,60 @@ def test_the_csv_has_every_figure_with_all_digits_beside_the_papers():
     assert float(row["seconds"]) == 1.0 / 3.0 and row["status"] == "a, b"
     assert row["l2_refine_0"] == "" and row["iterations_refine_1"] == "21"
     paper = {name.removeprefix("paper_"): value for name, value in row.items() if name.startswith("paper_")}
-    assert paper == {"arap_mean": "0.341", "arap_max": "13.269", "boundary": "0.000846", "table": "B.6"}
+    assert paper["arap_mean"] == "0.341" and paper["arap_max"] == "13.269" and paper["boundary"] == "0.000846"
+    assert paper["table"] == "B.6" and paper["seconds"] == "226.5"
 
 
 def test_figures_at_or_below_the_papers_are_bold_at_the_papers_scale(tmp_path):
     text = g1.as_markdown([CONCH, DUCK], options(tmp_path))
-    duck = ["duck", "certified", "0.0123", "**0.341**", "0.341", "13.270", "13.269", "**0.000400**", "0.000846"]
-    conch = ["conch", "folded", "", "**1.400**", "1.468", "99.000", "50.818", "99.000000", "0.001690"]
+    figures = ["0.0123", "**0.341**", "0.341", "13.270", "13.269", "**0.000400**", "0.000846"]
+    duck = ["duck", "1", "certified", "yes", *figures]
+    conch = ["conch", "1", "folded", "yes", "", "**1.400**", "1.468", "99.000", "50.818", "99.000000", "0.001690"]
     assert cells(text, "duck")[0] == duck and cells(text, "conch")[0] == conch
     assert cells(text, "duck")[1:] == [
         ["duck", "0.000567", "0.00891", "0.00123", "", "", "", "2"],
-        ["duck", "30 x 30 x 30", "120.0", "", "", "", "", ""],
+        ["duck", "30 x 30 x 30", "120.0", "226.5", "", "", "", "", ""],
         ["duck", "growth", "network, growth", "", "11 / 20.0", "", "3 / 30.0", "", "2 / 10.0"],
         ["duck", "", "", "", "", "2.50e-05", "", "21"],
     ]
 
 
+def test_a_map_of_several_blocks_is_measured_otherwise_and_never_bold(tmp_path):
+    row = replace(DUCK, model="horse_default", blocks=9, arap_mean_as_given=0.3, boundary_rms_as_given=0.001)
+    (found, *_) = cells(g1.as_markdown([row], options(tmp_path)), "horse_default")
+    assert found[1] == "9" and found[5:7] == ["0.300", "4.340"] and found[-2:] == ["**0.001000**", "0.003490"]
+
+
+def test_a_remeshed_shape_has_the_volume_of_the_conch_and_both_layouts(tmp_path):
+    (tmp_path / "cmu").mkdir()
+    write_obj(iga_nn.sample("bean"), tmp_path / "cmu/santa.obj")
+    chosen = options(tmp_path, names=("santa_cube", "santa_default"))
+    cube, default = g1._tasks(chosen, leave_out=())
+    assert (cube.mapping.blocks, default.mapping.blocks) == (1, "auto") and cube.mesh == default.mesh
+    surface = iga_nn.load_surface(cube.mesh)
+    assert surface.scale**-3 == pytest.approx(3.1416, rel=1e-6)
+    assert surface.vertices.max(axis=0) == pytest.approx(-surface.vertices.min(axis=0))
+    assert cube.problem_options.exact == "exp(x+z)*sin(y)"
+
+
 def test_a_failure_keeps_its_row_and_says_why(tmp_path):
-    rows = [g1.Row("bird", "no | surface"), replace(DUCK, status="cannot be solved"), g1.Row("santa4", g1.ABSENT)]
+    rows = [g1.Row("bird", "no | surface"), replace(DUCK, status="cannot be solved"), g1.Row("santa4", g1.NOT_PUBLIC)]
     text = g1.as_markdown(rows, options(tmp_path))
-    assert cells(text, "bird") == [["bird", "no \\| surface", "", "", "2.744", "", "37.446", "", "0.000961"]]
-    assert cells(text, "duck")[0][1] == "certified; cannot be solved"
-    assert cells(text, "santa4") == [["santa4", "model not public", "", "", "3.936", "", "95.842", "", "0.005270"]]
+    assert cells(text, "bird") == [["bird", "", "no \\| surface", "", "", "", "2.744", "", "37.446", "", "0.000961"]]
+    assert cells(text, "duck")[0][2] == "certified; cannot be solved"
+    assert cells(text, "santa4") == [
+        ["santa4", "", "model not public", "", "", "", "3.936", "", "95.842", "", "0.005270"]
+    ]
 
 
 def test_the_markdown_ends_with_the_counts_and_the_machine(tmp_path):
     bird = g1.Row("bird", "not found")
-    rows = [CONCH, DUCK, bird, g1.Row("santa4", g1.ABSENT)]
+    rows = [CONCH, DUCK, bird, g1.Row("santa4", g1.NOT_PUBLIC)]
     *_, counts, machine = g1.as_markdown(rows, options(tmp_path)).split("\n\n")
     assert counts.startswith(
-        "Certified 1 of 3; of G1, ARAP mean at or below the paper's 1 of 2, rms at the vertices at or below"
+        "Certified and one-to-one 1 of 3; of G1, ARAP mean at or below the paper's 1 of 2, rms at the vertices at or "
     )
-    assert counts.endswith("the paper's 1 of 2.")
+    assert counts.endswith("below the paper's 1 of 2.")
     assert f"{g1.processes.cores()} cores, 1 at a time" in machine and machine.endswith("preset fast, seed 0.\n")
     assert all(f"{name} " in machine for name in ("python", "torch", "numpy", "iga-nn"))
 
@@ -137,9 +160,14 @@ def test_models_that_are_not_there_have_their_rows(tmp_path, capsys):
     found = table(tmp_path / "new" / "out")
     assert list(found) == list(g1.PAPER)
     assert found["santa4"]["status"] == "model not public"
+    assert found["horse_cube"]["status"].startswith("not found: the README of HybridOctree_Hex")
     assert found["pig"]["status"] == f"{tmp_path}/models/pig.obj: not found; there, `iga-nn fetch pig` gets it"
-    assert "Certified 0 of 12; of G1, ARAP mean at or below the paper's 0 of 11" in capsys.readouterr().out
-    assert g1.main(["--models", str(tmp_path / "models"), "--out", str(tmp_path), "--only", "santa4"]) == 0
+    assert (
+        "Certified and one-to-one 0 of 12; of G1, ARAP mean at or below the paper's 0 of 11" in capsys.readouterr().out
+    )
+    assert (
+        g1.main(["--models", str(tmp_path / "models"), "--out", str(tmp_path), "--only", "santa4", "duck_default"]) == 0
+    )
 
 
 def test_models_are_looked_for_in_the_folder_of_the_environment(tmp_path, monkeypatch):
@@ -148,10 +176,10 @@ def test_models_are_looked_for_in_the_folder_of_the_environment(tmp_path, monkey
     assert chosen.models == tmp_path and chosen.names == ("conch", "pig")
     (tmp_path / "pig.mesh").touch()
     (tmp_path / "santa4.obj").touch()
-    assert g1._file("pig", tmp_path).name == "pig.mesh"
+    assert g1.file_of("pig", tmp_path).name == "pig.mesh"
     assert g1._absence("pig", tmp_path) is None and g1._absence("santa4", tmp_path) is None
     (tmp_path / "pig.obj").touch()
-    assert g1._file("pig", tmp_path).name == "pig.obj"
+    assert g1.file_of("pig", tmp_path).name == "pig.obj"
 
 
 def test_bad_arguments_are_one_line(tmp_path, capsys):

@@ -288,14 +288,30 @@ def test_validation_runs_what_is_there_and_keeps_the_row_of_what_is_not(formula_
     formula_training()
     Path("models").mkdir()
     main(["sample", "ellipsoid", "--out", "models/conch.obj"])
-    assert load("validation").main(["--models", "models", "--out", "out", "--steps-factor", "0.1"]) == 0
+    assert load("benchmarks/validation").main(["--models", "models", "--out", "out", "--steps-factor", "0.1"]) == 0
     text = Path("out/validation.md").read_text()
     assert text.strip() in capsys.readouterr().out
-    assert "| conch | paper | 1.468 | 50.818 | 0.00169 | - |" in text
+    assert "| conch | paper | 1 | 1.468 | 50.818 | 0.00169 | - | - |" in text
+    assert "| horse_default | ours | not found" in text
+    assert "| horse_default | paper | 190.73 | 39.71 | 230.44 |" in text
     assert "| santa4 | ours | model not public |" in text
     assert "| santa4 | paper | 194.23 | 38.71 | 232.93 |" in text
     assert "no measurement" in text
     assert text.count("| conch | 0 | 343 |") == 1 and "![error](conch/figure14.png)" in text
+
+
+def test_a_model_with_a_fault_fails_the_validation():
+    faults = load("benchmarks/validation")._faults
+    quality = {"bijective": "certified", "boundary_injective": True}
+    report = {"parameterization": quality, "poisson": {"levels": [{"l2_relative": 1e-3}, {"l2_relative": 9e-5}]}}
+    assert faults("conch", report) == [] and faults("santa4", "model not public") == []
+    assert faults("conch", "run failed") == ["conch: run failed"]
+    quality["boundary_injective"] = False
+    report["poisson"]["levels"][1]["l2_relative"] = 2e-4
+    assert faults("conch", report) == [
+        "conch: certified, one-to-one: no",
+        "conch: relative L2 error 2.0e-04, larger than 1e-04",
+    ]
 
 
 @pytest.mark.slow
