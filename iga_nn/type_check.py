@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, fields
+from functools import cache
 from numbers import Integral, Real
 from pathlib import Path
 from types import NoneType, UnionType
@@ -26,9 +27,15 @@ class Checked:
 
     def __post_init__(self) -> None:
         """Refuse the first field whose value has another type."""
-        hints = get_type_hints(type(self))
+        hints = hints_of(type(self))  # type: ignore[arg-type]  # classes have hashes
         for field in fields(self):
             check_type(field.name.replace("_", " "), getattr(self, field.name), hints[field.name])
+
+
+@cache
+def hints_of(kind: Any) -> dict[str, Any]:
+    """Return the annotations of a class's fields, evaluated once: that takes a millisecond."""
+    return get_type_hints(kind)
 
 
 def check_type(name: str, value: Any, hint: Any) -> None:

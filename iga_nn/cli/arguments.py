@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, make_dataclass
 from pathlib import Path
 from types import FunctionType
-from typing import Annotated, Any, get_args, get_type_hints
+from typing import Annotated, Any, get_args
 
 from cyclopts import App, CycloptsError, Parameter, Token, convert
 
@@ -20,6 +20,7 @@ from ..options import (
     SurfaceOptions,
     WorkerOptions,
 )
+from ..type_check import hints_of
 
 
 def converted(kind: Any, tokens: Sequence[Token]) -> Any:
@@ -65,7 +66,7 @@ def for_each_problem(group: App, *, is_default: bool = False, hidden: Sequence[s
 
 def _without(kind: type[ProblemOptions], names: Sequence[str]) -> type[ProblemOptions]:
     """Return the options of a problem of which some are no flags, and have their defaults."""
-    hints, left = get_type_hints(kind), [field for field in fields(kind) if field.name in names]
+    hints, left = hints_of(kind), [field for field in fields(kind) if field.name in names]
     if not left:
         return kind
     rows = [(field.name, Annotated[hints[field.name], Parameter(parse=False)], field.default) for field in left]

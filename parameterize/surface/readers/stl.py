@@ -1,27 +1,30 @@
-"""STL, text and binary, read by trimesh once the counts are checked.
+"""STL, text and binary, read once the counts are checked.
 
 Names of solids in a text may be any words: they are removed first, with all lines before the first solid. The names
-of several solids become groups.
+of several solids become groups, and facets of one solid share vertices, so that solids that touch are told apart.
 """
 
-import io
 import re
 
 import numpy as np
 
+from ...arrays import Array, IntArray
 from ..errors import MeshError, check_face_count
-from ..groups import Groups, gathered
-from .common import DAMAGED, Content, SurfaceFile, library
+from ..groups import gathered
+from .common import DAMAGED, Content, SurfaceFile
 
 SOLID = re.compile(rb"^[ \t]*((?:end)?solid)\b(.*)$", re.IGNORECASE | re.MULTILINE)
 ENDED = re.compile(rb"\bendfacet\b", re.IGNORECASE)
 BEFORE = 4096  # bytes in which the first solid begins
+FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
+CORNER = re.compile(rb"\bvertex\s+(\S+)\s+(\S+)\s+(\S+)", re.IGNORECASE)
 
 
 def read_stl(file: SurfaceFile) -> Content:
-    """Read the triangles of an STL whose size or number of corners fits its facets; each has vertices of its own."""
-    import trimesh
+    """Read the triangles of an STL whose size or number of corners fits its facets.
 
+    The facets of a single solid have vertices of their own.
+    """
     data = file.data
     promised = int.from_bytes(data[80:84], "little")
     expected = 84 + 50 * promised
@@ -35,13 +38,12 @@ def read_stl(file: SurfaceFile) -> Content:
     elif not is_binary:
         raise MeshError(f"STL of {promised} triangles must have {expected} bytes, this one has {len(data)}; {DAMAGED}")
     check_face_count(promised, file.max_faces)
-    with library(".stl"):
-        mesh = trimesh.load_mesh(io.BytesIO(text), file_type="stl", process=False)
-        vertices, triangles = np.array(mesh.vertices, dtype=np.float64), mesh.faces.tolist()
-    if len(triangles) < promised:
-        raise MeshError(f"{promised} faces promised, {len(triangles)} read; {DAMAGED}")
+    corners = np.frombuffer(data, FACET, promised, 84)["corners"] if is_binary else _corners(text)
+    vertices, numbers = corners.reshape(-1, 3).astype(np.float64), np.arange(3 * promised)
+    if solids := [] if is_binary else _solids(data):
+        vertices, numbers = _shared_by_solid(vertices, solids)
     notices = ("binary STL although it starts with 'solid'",) * (is_binary and says_solid)
-    return Content(vertices, triangles, notices, {} if is_binary else _solids(data))
+    return Content(vertices, numbers.reshape(-1, 3).tolist(), notices, gathered(solids))
 
 
 def _trimmed(data: bytes) -> bytes:
@@ -51,18 +53,27 @@ def _trimmed(data: bytes) -> bytes:
     return SOLID.sub(rb"\1", text[first.start() :]) if first else data
 
 
-def _solids(data: bytes) -> Groups:
-    """Return the facets of each solid by its name where there are several; "solid 2" where the second has none."""
+def _solids(data: bytes) -> list[tuple[str, range]]:
+    """Return the name and the facets of each solid where there are several; "solid 2" where the second has no name."""
     text = _with_newlines(data)
     begun = [match for match in SOLID.finditer(text) if match[1].lower() == b"solid"]
     if len(begun) < 2:
-        return {}
+        return []
     facets = [match.start() for match in ENDED.finditer(SOLID.sub(_blanked, text))]
     starts = np.searchsorted(facets, [match.start() for match in begun])
     ends = [*starts[1:], len(facets)]
     names = [match[2].decode("utf-8", errors="replace").strip() for match in begun]
     parts = zip(names, starts, ends, strict=True)
-    return gathered((name or f"solid {k}", range(start, end)) for k, (name, start, end) in enumerate(parts, 1))
+    return [(name or f"solid {k}", range(start, end)) for k, (name, start, end) in enumerate(parts, 1)]
+
+
+def _shared_by_solid(corners: Array, solids: list[tuple[str, range]]) -> tuple[Array, IntArray]:
+    """Return the places (n, 3) of the corners (k, 3) of each solid, in their order, and the number of each corner's."""
+    owners = np.repeat(np.arange(len(solids)), [3 * len(facets) for _, facets in solids])
+    rows = np.column_stack([owners, corners])
+    _, first, place = np.unique(rows, axis=0, return_index=True, return_inverse=True)
+    order = np.argsort(first)
+    return corners[first[order]], np.argsort(order)[place.ravel()]
 
 
 def _blanked(line: re.Match[bytes]) -> bytes:
@@ -73,6 +84,14 @@ def _blanked(line: re.Match[bytes]) -> bytes:
 def _with_newlines(data: bytes) -> bytes:
     r"""Return a text without its byte order mark, its lines ended by \n."""
     return data.removeprefix(b"\xef\xbb\xbf").replace(b"\r\n", b"\n").replace(b"\r", b"\n")
+
+
+def _corners(text: bytes) -> Array:
+    """Return the corners (3 m, 3) of the facets of a text."""
+    try:
+        return np.array(CORNER.findall(text), dtype=np.float64)
+    except ValueError as error:  # which names the word
+        raise MeshError(f"not readable as .stl ({error}); {DAMAGED}") from None
 
 
 def _facets(text: bytes) -> int:
