@@ -138,21 +138,22 @@ class BlockDeterminants:
         points = points.reshape(len(points), 3, *spans.weights.shape[2:], spans.weights.shape[2])
         bezier = np.ascontiguousarray(np.moveaxis(points, 0, -1))  # (3, p + 1, p + 1, p + 1, k)
         nets = [np.diff(bezier, axis=1 + d) * scale[..., None] for d, scale in enumerate(self._scales)]
-        crosses = [cross_products(nets[(d + 1) % 3], nets[(d + 2) % 3]) for d in range(3)]
+        cross = cross_products(nets[1], nets[2])
         determinant = np.zeros((*self._unscale.shape, len(spans.first)))
         for component in range(3):
-            add_products(nets[0][component], crosses[0][component], 1.0, determinant)
-        unscaled = self._unscale[..., None] / spans.volumes
-        short = np.moveaxis(spans.floors - determinant * unscaled, -1, 0)
-        unscaled = np.ascontiguousarray(np.moveaxis(unscaled, -1, 0))
+            add_products(nets[0][component], cross[component], 1.0, determinant)
+        chosen = _has_short(determinant, self._unscale, spans.volumes, spans.floors)
+        spans, nets = spans.some(chosen), [net[..., chosen] for net in nets]  # few: the rest is made for these alone
+        unscaled = self._unscale / spans.volumes[:, None, None, None]
+        short = spans.floors[:, None, None, None] - np.moveaxis(determinant[..., chosen], -1, 0) * unscaled
         place = np.ascontiguousarray(np.argwhere(short > 0.0))  # (r, 4): span and coefficient, span by span
-        rows = np.zeros((len(place), *np.roll(bezier.shape, 1)[1:]), dtype=dtype)
-        for direction, (cross, scale) in enumerate(zip(crosses, self._scales, strict=True)):
-            _add_derivatives(place, cross, scale, unscaled, direction, rows)
-        counts = np.bincount(place[:, 0], minlength=len(spans.first))
-        starts = np.concatenate([[0], np.cumsum(counts[counts > 0])])
+        rows = np.zeros((len(place), 3, *bezier.shape[1:4]), dtype=dtype)
+        crosses = cross[..., chosen], cross_products(nets[2], nets[0]), cross_products(nets[0], nets[1])
+        for direction, (other, scale) in enumerate(zip(crosses, self._scales, strict=True)):
+            _add_derivatives(place, other, scale, unscaled, direction, rows)
+        starts = np.concatenate([[0], np.cumsum(np.bincount(place[:, 0], minlength=len(short)))])
         shares = spans.shares[place[:, 0]].astype(dtype)
-        return _Rows(spans.some(counts > 0), short[tuple(place.T)], shares, rows, starts)
+        return _Rows(spans, short[tuple(place.T)], shares, rows, starts)
 
 
 class DeterminantPenalty(Blockwise[BlockDeterminants]):
@@ -238,6 +239,17 @@ def _bezier_points(control: Array, first: IntArray, weights: Array) -> Array:
             points[s, c] = control[c, u : u + n, v : v + n, w : w + n].copy().ravel()
             _along_axes(points[s, c], weights[s, 0], weights[s, 1], weights[s, 2])
     return points
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _has_short(determinant: Array, unscale: Array, volumes: Array, floors: Array) -> Mask:
+    """Return which spans (k,) have a coefficient below their floor, of coefficients (q, q, q, k) in scaled form."""
+    coefficients, factors = determinant.reshape(-1, len(floors)), unscale.ravel()
+    least = np.full(len(floors), np.inf)
+    for i in range(len(factors)):
+        for s in range(len(floors)):
+            least[s] = min(least[s], coefficients[i, s] * (factors[i] / volumes[s]))
+    return least < floors
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
