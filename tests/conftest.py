@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-os.environ.setdefault("OMP_NUM_THREADS", "1")  # before torch: its sums round differently with the number of threads
+os.environ.setdefault("OMP_NUM_THREADS", "1")  # before the libraries that read it
 for _number in (signal.SIGINT, signal.SIGTERM):
     if signal.getsignal(_number) is signal.SIG_IGN:  # `nohup make test &`; what the tests start would inherit it
         signal.signal(_number, lambda *_: None)  # so it is ignored here alone: a new program starts with the default

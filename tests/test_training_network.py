@@ -1,88 +1,107 @@
+import numpy as np
 import pytest
 import torch
 
 from parameterize.config import NetworkConfig
-from parameterize.training.network import InverseMap, ResidualModule, map_in_pieces
+from parameterize.training.network import InverseMap
 
 SMALL = NetworkConfig(width=16, modules=2, frequencies=3)
 
 
-@pytest.mark.parametrize("dtype", [torch.float32, torch.float64])
+def made(config=SMALL, dtype="float64", seed=0):
+    return InverseMap(config, np.random.default_rng(seed), "cpu", dtype)
+
+
+def trained():
+    """A network whose last layer is not zero, and its points."""
+    network, rng = made(), np.random.default_rng(1)
+    network.parameters["last.weight"] = network.there(rng.normal(size=(3, 16)))
+    return network, rng.random((2500, 3))
+
+
+@pytest.mark.parametrize("dtype", ["float32", "float64"])
 def test_untrained_network_is_the_identity(dtype):
-    torch.manual_seed(0)
-    network = InverseMap(SMALL).to(dtype)
-    points = torch.rand(50, 3, dtype=dtype) * 3.0 - 1.0
-    assert torch.allclose(network(points), points, atol=4.0 * torch.finfo(dtype).eps)
+    points = 3.0 * np.random.default_rng(0).random((50, 3)) - 1.0
+    mapped = made(dtype=dtype).at(points)
+    assert mapped.dtype == np.float64
+    assert mapped == pytest.approx(points, abs=6.0 * float(np.finfo(dtype).eps))
 
 
 def test_untrained_network_is_the_affine_map_it_starts_from():
-    network = InverseMap(SMALL)
-    matrix = torch.tensor([[2.0, 0.0, 0.0], [0.0, 0.5, 0.0], [0.5, 0.0, 1.0]])
-    network.affine.copy_(matrix)
-    points = torch.rand(50, 3)
-    assert torch.allclose(network(points), (points - 0.5) @ matrix.T + 0.5, atol=1e-6)
+    network = made()
+    matrix = np.array([[2.0, 0.0, 0.0], [0.0, 0.5, 0.0], [0.5, 0.0, 1.0]])
+    network.affine = network.there(matrix)
+    points = np.random.default_rng(0).random((50, 3))
+    assert network.at(points) == pytest.approx((points - 0.5) @ matrix.T + 0.5)
 
 
 def test_identity_network_still_has_a_gradient_to_leave_it():
-    torch.manual_seed(0)
-    network = InverseMap(SMALL)
-    points = torch.rand(50, 3)
-    (network(points) - 2.0 * points).square().sum().backward()
-    assert float(network.last.weight.grad.abs().max()) > 0.0
+    mapped, pulled_back = made().with_gradient(np.random.default_rng(0).random((50, 3)))
+    assert pulled_back(-mapped)["last.weight"].abs().max() > 0.0
 
 
 def test_encoding_by_hand():
-    network = InverseMap(NetworkConfig(width=4, modules=1, frequencies=2)).double()
-    with torch.no_grad():
-        network.scale.fill_(1.5)
-    x = torch.tensor([[0.1, 0.2, 0.7]], dtype=torch.float64)
-    encoded = network.encode(x)
+    network = made(NetworkConfig(width=4, modules=1, frequencies=2, scale=1.5))
+    x = np.array([[0.1, 0.2, 0.7]])
     expected = [x]
     for n in (1, 2):
-        phase = 1.5 * n * x
-        expected += [torch.sin(phase) / (1.5 * n), torch.cos(phase) / (1.5 * n)]
-    assert encoded.shape == (1, 6 * 2 + 3)
-    assert torch.equal(encoded.sort().values, torch.cat(expected, dim=1).sort().values)
-    assert torch.allclose(encoded, torch.cat(expected, dim=1), atol=1e-15)
+        expected += [np.sin(1.5 * n * x) / (1.5 * n), np.cos(1.5 * n * x) / (1.5 * n)]
+    assert network.encode(torch.tensor(x)).numpy() == pytest.approx(np.concatenate(expected, axis=1), abs=1e-15)
 
 
-def test_residual_module_adds_to_its_input():
-    module = ResidualModule(5)
-    x = torch.randn(4, 5)
-    assert torch.equal(module(x), x + torch.relu(x @ module.linear.weight.T + module.linear.bias))
+def test_modules_add_to_their_input():
+    network, points = trained()
+    weights = network.state()
+    hidden = np.maximum(
+        network.encode(torch.tensor(points)).numpy() @ weights["first.weight"].T + weights["first.bias"], 0.0
+    )
+    for module in ("module0", "module1"):
+        hidden = hidden + np.maximum(hidden @ weights[f"{module}.weight"].T + weights[f"{module}.bias"], 0.0)
+    assert network.at(points) == pytest.approx(points + hidden @ weights["last.weight"].T)
 
 
-def test_shape_follows_the_options():
-    network = InverseMap(SMALL)
-    assert network.first.in_features == 6 * 3 + 3 and network.first.out_features == 16
-    assert len(network.residual) == 2
-    assert "multiples" in network.state_dict() and "scale" in dict(network.named_parameters())
+def test_shapes_follow_the_options():
+    shapes = {name: values.shape for name, values in made().parameters.items()}
+    assert shapes["first.weight"] == (16, 6 * 3 + 3) and shapes["module1.weight"] == (16, 16)
+    assert "module2.weight" not in shapes and shapes["scale"] == (1,)
 
 
 def test_first_weights_are_drawn_from_the_generator():
-    torch.manual_seed(5)
-    expected = torch.nn.Linear(6 * 3 + 3, 16)
-    torch.manual_seed(6)
-    network = InverseMap(SMALL, torch.Generator().manual_seed(5))
-    assert torch.equal(network.first.weight, expected.weight) and torch.equal(network.first.bias, expected.bias)
+    same, other = made().state(), made(seed=1).state()
+    for name, values in made().state().items():
+        assert np.array_equal(values, same[name])
+        assert not name.startswith(("first", "module")) or not np.array_equal(values, other[name])
 
 
-def test_pieces_give_the_networks_map_and_gradient_with_the_same_bits_for_any_number_of_threads(monkeypatch):
-    network = InverseMap(SMALL).double()
-    torch.nn.init.normal_(network.last.weight, generator=torch.Generator().manual_seed(0))
-    points = torch.rand(2500, 3, dtype=torch.float64, generator=torch.Generator().manual_seed(1))
+def test_a_restored_network_is_the_one_of_the_state():
+    network, points = trained()
+    other = made(seed=5)
+    other.restore(network.state())
+    assert np.array_equal(network.at(points), other.at(points))
 
-    def found(mapping):
-        network.zero_grad()
-        mapped = mapping(points)
-        mapped.square().sum().backward()
-        return [mapped.detach(), *(parameter.grad for parameter in network.parameters())]
 
-    expected = found(network)
+def test_pieces_give_the_networks_gradient_with_the_same_bits_for_any_number_of_threads(monkeypatch):
+    network, points = trained()
+    slopes = np.random.default_rng(2).normal(size=points.shape)
     monkeypatch.delenv("NUMBA_NUM_THREADS", raising=False)
-    monkeypatch.setenv("OMP_NUM_THREADS", "1")
-    one = found(lambda x: map_in_pieces(network, x))
-    monkeypatch.setenv("OMP_NUM_THREADS", "3")
-    three = found(lambda x: map_in_pieces(network, x))
-    assert all(torch.allclose(a, b, rtol=1e-10) for a, b in zip(expected, one, strict=True))
-    assert all(torch.equal(a, b) for a, b in zip(one, three, strict=True))
+    found = []
+    for threads in ("1", "3"):
+        monkeypatch.setenv("OMP_NUM_THREADS", threads)
+        mapped, pulled_back = network.with_gradient(points)
+        found.append([mapped, *pulled_back(slopes).values()])
+    assert all(np.array_equal(a, b) for a, b in zip(*found, strict=True))
+
+
+def test_the_gradient_is_that_of_torch():
+    network, points = trained()
+    slopes = np.random.default_rng(2).normal(size=points.shape)
+    gradient = network.with_gradient(points)[1](slopes)
+    for values in network.parameters.values():
+        values.requires_grad_()
+    x, p = torch.tensor(points), network.parameters
+    hidden = (network.encode(x) @ p["first.weight"].T + p["first.bias"]).relu()
+    for module in network.modules:
+        hidden = hidden + (hidden @ p[f"{module}.weight"].T + p[f"{module}.bias"]).relu()
+    ((hidden @ p["last.weight"].T + p["last.bias"]) * torch.tensor(slopes)).sum().backward()
+    for name, values in p.items():
+        assert gradient[name].numpy() == pytest.approx(values.grad.numpy(), rel=1e-9, abs=1e-9), name

@@ -5,7 +5,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-import torch
 from scipy.spatial.transform import Rotation
 from shapes import ball
 from small_run import STEPS, small_surface, tiny_config
@@ -52,14 +51,14 @@ def turns_are_promising(monkeypatch):
 
 
 def test_a_turned_network_maps_to_the_turned_places():
-    network = InverseMap(NetworkConfig(width=8, modules=1), torch.Generator().manual_seed(0))
-    torch.nn.init.normal_(network.last.weight)
-    torch.nn.init.normal_(network.last.bias)
-    points = torch.rand(20, 3)
-    with torch.no_grad():
-        before = network(points) - 0.5
-        network.turn(torch.as_tensor(QUARTER))
-        assert torch.allclose(network(points) - 0.5, before @ torch.as_tensor(QUARTER).float().T, atol=1e-5)
+    rng = np.random.default_rng(0)
+    network = InverseMap(NetworkConfig(width=8, modules=1), rng, "cpu", "float64")
+    for name in ("last.weight", "last.bias"):
+        network.parameters[name] = network.there(rng.normal(size=network.parameters[name].shape))
+    points = rng.random((20, 3))
+    before = network.at(points) - 0.5
+    network.turn(QUARTER)
+    assert network.at(points) - 0.5 == pytest.approx(before @ QUARTER.T)
 
 
 def test_the_best_turn_makes_the_hollowness_least():

@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-import torch
+from scipy.spatial.distance import cdist
 
 from parameterize.training.target_shapes import (
     cuboid_scale,
@@ -12,39 +12,38 @@ from parameterize.training.target_shapes import (
 
 
 def random_points(count=300, low=-0.6, high=1.6):
-    generator = torch.Generator().manual_seed(0)
-    return low + (high - low) * torch.rand(count, 3, generator=generator, dtype=torch.float64)
+    return np.random.default_rng(0).uniform(low, high, (count, 3))
 
 
 def cube_samples(n):
     """A grid with edges and corners on every face of the unit cube."""
-    row = torch.linspace(0.0, 1.0, n, dtype=torch.float64)
-    a, b = (x.reshape(-1) for x in torch.meshgrid(row, row, indexing="ij"))
+    row = np.linspace(0.0, 1.0, n)
+    a, b = (x.reshape(-1) for x in np.meshgrid(row, row, indexing="ij"))
     faces = []
     for axis in range(3):
         for side in (0.0, 1.0):
-            face = torch.full((len(a), 3), side, dtype=torch.float64)
+            face = np.full((len(a), 3), side)
             face[:, (axis + 1) % 3], face[:, (axis + 2) % 3] = a, b
             faces.append(face)
-    return torch.cat(faces)
+    return np.concatenate(faces)
 
 
 def distance_to_cube_body(points):
-    return (points - points.clamp(0.0, 1.0)).norm(dim=1)
+    return np.linalg.norm(points - points.clip(0.0, 1.0), axis=1)
 
 
 def cuboid_samples(d, n=120):
     """Dense points of the boundary of S(d): rays from the centre, cut where the distance to the cube is d."""
-    k = torch.arange(n * n, dtype=torch.float64)
+    k = np.arange(n * n)
     z = 1.0 - (2.0 * k + 1.0) / len(k)
     angle = np.pi * (3.0 - np.sqrt(5.0)) * k
-    radius = (1.0 - z**2).sqrt()
-    rays = torch.stack([radius * torch.cos(angle), radius * torch.sin(angle), z], dim=1)
-    low, high = torch.zeros(len(k), 1, dtype=torch.float64), torch.full((len(k), 1), d + 1.0, dtype=torch.float64)
+    radius = np.sqrt(1.0 - z**2)
+    rays = np.stack([radius * np.cos(angle), radius * np.sin(angle), z], axis=1)
+    low, high = np.zeros((len(k), 1)), np.full((len(k), 1), d + 1.0)
     for _ in range(60):
         middle = 0.5 * (low + high)
         inside = (distance_to_cube_body(0.5 + middle * rays) < d)[:, None]
-        low, high = torch.where(inside, middle, low), torch.where(inside, high, middle)
+        low, high = np.where(inside, middle, low), np.where(inside, high, middle)
     return 0.5 + cuboid_scale(d) * low * rays
 
 
@@ -68,25 +67,25 @@ def test_nearest_on_cuboid_against_dense_samples(d):
     scale = cuboid_scale(d)
     unscaled = 0.5 + (found - 0.5) / scale
     assert distance_to_cube_body(unscaled) == pytest.approx(d, abs=1e-12)  # it lies on the boundary of S(d)
-    brute = torch.cdist(points, samples).min(dim=1).values
-    gap = (points - found).norm(dim=1)
+    brute = cdist(points, samples).min(axis=1)
+    gap = np.linalg.norm(points - found, axis=1)
     assert (gap <= brute + 1e-12).all()  # no sample is closer
     assert (gap >= brute - 0.02).all()
 
 
 def test_nearest_on_cuboid_inside_the_core_cube_goes_straight_to_the_closest_side():
     d = 1.0
-    found = nearest_on_cuboid(torch.tensor([[0.5, 0.45, 0.5]], dtype=torch.float64), d)
+    found = nearest_on_cuboid(np.array([[0.5, 0.45, 0.5]]), d)
     assert found[0].tolist() == pytest.approx([0.5, 0.5 - 1.5 * cuboid_scale(d), 0.5])
 
 
 def test_nearest_on_cube_against_dense_samples():
     points, samples = random_points(low=-0.3, high=1.3), cube_samples(101)
     found = nearest_on_cube(points)
-    assert ((found == 0.0) | (found == 1.0)).any(dim=1).all()
+    assert ((found == 0.0) | (found == 1.0)).any(axis=1).all()
     assert ((found >= 0.0) & (found <= 1.0)).all()
-    brute = torch.cdist(points, samples).min(dim=1).values
-    gap = (points - found).norm(dim=1)
+    brute = cdist(points, samples).min(axis=1)
+    gap = np.linalg.norm(points - found, axis=1)
     assert (gap <= brute + 1e-12).all() and (gap >= brute - 0.01).all()
 
 
@@ -103,20 +102,18 @@ def test_nearest_on_cube_against_dense_samples():
     ],
 )
 def test_nearest_on_cube_by_hand(point, expected):
-    for dtype in (torch.float32, torch.float64):
-        found = nearest_on_cube(torch.tensor([point], dtype=dtype))
-        assert found[0].tolist() == pytest.approx(expected, abs=1e-7)
+    assert nearest_on_cube(np.array([point]))[0].tolist() == pytest.approx(expected, abs=1e-15)
 
 
 def test_nearest_on_a_given_face():
-    points = torch.tensor([[0.2, 0.3, 0.9]] * 6, dtype=torch.float64)
+    points = np.array([[0.2, 0.3, 0.9]] * 6)
     points[5, 0] = -0.4
-    found = nearest_on_cube_face(points, torch.arange(6))
+    found = nearest_on_cube_face(points, np.arange(6))
     expected = [[0, 0.3, 0.9], [1, 0.3, 0.9], [0.2, 0, 0.9], [0.2, 1, 0.9], [0.2, 0.3, 0], [0, 0.3, 1]]
     assert found.tolist() == expected
 
 
 def test_targets_by_name():
     points = random_points(20)
-    assert torch.equal(nearest("cube", points), nearest_on_cube(points))
-    assert torch.equal(nearest("S(2)", points), nearest_on_cuboid(points, 2.0))
+    assert np.array_equal(nearest("cube", points), nearest_on_cube(points))
+    assert np.array_equal(nearest("S(2)", points), nearest_on_cuboid(points, 2.0))

@@ -11,7 +11,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import torch
 import trimesh
 from thick_bodies import star
 
@@ -130,31 +129,12 @@ def test_the_decomposition_of_the_estimate_is_that_of_the_run(monkeypatch):
     assert len(asked) == 2
 
 
-def test_the_calibration_takes_less_than_a_second_and_no_random_numbers():
+def test_the_calibration_takes_less_than_a_second():
     bean, fast = iga_nn.sample("bean"), preset("fast")
-    forecast(bean, fast, device=CPU)  # loads torch
-    before, start = torch.get_rng_state(), time.process_time()
+    forecast(bean, fast, device=CPU)  # loads the kernels
+    start = time.process_time()
     forecast(bean, fast, device=CPU)
     assert time.process_time() - start < 1.0
-    assert torch.equal(torch.get_rng_state(), before)
-
-
-def test_measuring_leaves_one_thread_an_operation_to_the_threads_that_help():
-    """They keep torch's setting of their first operation: with more, bits would depend on who takes a piece."""
-    script = """
-import threading, torch, iga_nn
-from iga_nn.workflow.cost_estimate import forecast
-from parameterize.config import preset
-from parameterize.training.backend import one_thread_an_operation
-from parameterize.threads import in_parallel
-forecast(iga_nn.sample("cube"), preset("fast").with_control_points(8), device="cpu")
-barrier = threading.Barrier(2, timeout=10.0)
-with one_thread_an_operation():
-    print(in_parallel(lambda _: barrier.wait() * 0 + torch.get_num_threads(), range(2), 2))
-"""
-    env = os.environ | {"OMP_NUM_THREADS": "2", "NUMBA_NUM_THREADS": "2", "PYTHONPATH": PACKAGES}
-    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True, env=env)
-    assert done.stdout.split() == ["[1,", "1]"]
 
 
 @pytest.mark.slow
@@ -162,8 +142,6 @@ def test_a_small_run_takes_what_was_said(in_folder):
     """In processor seconds, and resident memory, of a process of its own: other programs may keep this one waiting."""
     script = f"""
 import json, resource, sys, time
-import torch
-torch.set_num_threads(1)
 import iga_nn
 from iga_nn.workflow.cost_estimate import forecast
 from iga_nn.cli.commands import main

@@ -38,7 +38,7 @@ PASS_POINTS = 4096  # that a pass is timed with, on all threads
 LARGEST = 30  # control points per direction that the product is timed with; beyond, it grows with their number
 
 CALLS = 0.12  # passes: least cost of a product
-PASS = 0.0103  # seconds of a pass at pace 1, where no network is trained and torch is not loaded
+PASS = 0.0103  # seconds of a pass on the CPU at pace 1
 
 # Megabytes
 LIBRARIES, FIGURES, PER_CONTROL_POINT, PER_VERTEX, PER_UNKNOWN = 560.0, 400.0, 8e-3, 16e-3, 1.6e-3
@@ -130,7 +130,7 @@ def forecast(
     now, degree = pace(clock), config.spline.degree
     low, high = (now * seconds for seconds in cost.seconds)
     if any(cost.passes) or any(cost.products):
-        one_pass = _trained_pass_seconds(config, device, clock) if way == NETWORK.name else PASS * now
+        one_pass = PASS * now if device == "cpu" or way != NETWORK.name else _pass_seconds(config, device, clock)
         product = _product_seconds(config.spline, clock) + CALLS * one_pass
         pairs = zip(cost.passes, cost.products, strict=True)
         more = [passes * one_pass + products * product for passes, products in pairs]
@@ -140,16 +140,9 @@ def forecast(
     return Forecast((low + now * last, high + now * last), memory, way, now)
 
 
-def _trained_pass_seconds(config: Config, device: str, clock: Clock) -> float:
-    """Return the seconds of a pass in the present settings of a training."""
-    from parameterize.training.backend import one_thread_an_operation
-
-    with one_thread_an_operation():  # as the run does: a helping thread keeps its first settings
-        return _pass_seconds(config, device, clock)
-
-
 def _pass_seconds(config: Config, device: str, clock: Clock) -> float:
-    from parameterize.training.network import a_pass
+    """Return the seconds of a pass of the network on a GPU."""
+    from parameterize.training.network import a_pass  # it loads torch, which takes a second
 
     return fastest(a_pass(config.network, device, PASS_POINTS), clock) * 1000.0 / PASS_POINTS
 

@@ -1,26 +1,20 @@
 """Optimises the network: Muon for the matrices of the hidden layers, Adam for all other numbers.
 
 Muon takes steps whose singular values are all alike (Jordan et al., 2024), so that directions with a small gradient
-advance as fast as the others. torch's own Muon computes in bfloat16, which takes 20 times as long as float32 on
-processors without instructions for it; this class computes in the precision of the parameters.
+advance as fast as the others.
 """
 
 import math
+from collections.abc import Iterable
 
+import numpy as np
 import torch
 from torch import Tensor
-from torch.optim.adam import adam
 
+from ..arrays import Floats
 from ..config import TrainConfig
 from ..threads import in_parallel
-from .network import InverseMap
-
-Tensors = dict[str, Tensor]
-
-
-def _gradient(parameter: Tensor) -> Tensor:
-    assert parameter.grad is not None
-    return parameter.grad
+from .network import InverseMap, Parameters, back
 
 
 class Muon:
@@ -34,23 +28,21 @@ class Muon:
     _POLYNOMIAL = (3.4445, -4.7750, 2.0315)  # of the quintic iteration by Jordan et al.: singular values go near 1
     _ITERATIONS = 5
 
-    def __init__(self, matrices: list[Tensor], lr: float) -> None:
-        self.parameters, self._rate = matrices, lr
-        self.moments = [{"momentum_buffer": torch.zeros_like(matrix)} for matrix in matrices]
+    def __init__(self, matrices: Parameters, lr: float) -> None:
+        self.moments = {"mean": {name: torch.zeros_like(matrix) for name, matrix in matrices.items()}}
+        self._rate = lr
 
-    @torch.no_grad()
-    def step(self, share: float) -> None:
-        """Take one step at a share of the learning rate."""
-        pairs = list(zip(self.parameters, self.moments, strict=True))
-        in_parallel(lambda pair: self._step(*pair, share * self._rate), pairs)
+    def step(self, parameters: Parameters, gradients: Parameters, share: float, _: int) -> None:
+        """Take one step at a share of the learning rate, in place."""
 
-    @torch.no_grad()
-    def _step(self, matrix: Tensor, moments: Tensors, rate: float) -> None:
-        gradient, momentum = _gradient(matrix), moments["momentum_buffer"]
-        momentum.lerp_(gradient, 1.0 - self._MOMENTUM)
-        direction = self._orthogonal(gradient.lerp(momentum, self._MOMENTUM))
-        rows, columns = matrix.shape
-        matrix.sub_(direction, alpha=rate * math.sqrt(max(1.0, rows / columns)))
+        def one(name: str) -> None:
+            gradient, mean, matrix = gradients[name], self.moments["mean"][name], parameters[name]
+            mean.lerp_(gradient, 1.0 - self._MOMENTUM)
+            direction = self._orthogonal(gradient.lerp(mean, self._MOMENTUM))
+            rows, columns = matrix.shape
+            matrix.sub_(direction, alpha=share * self._rate * math.sqrt(max(1.0, rows / columns)))
+
+        in_parallel(one, list(self.moments["mean"]))
 
     def _orthogonal(self, matrix: Tensor) -> Tensor:
         """Return an approximation of U V^T for a matrix U S V^T.
@@ -68,69 +60,63 @@ class Muon:
 
 
 class Adam:
-    """Take Adam's steps as torch computes them; `torch.optim.Adam` would load torch's compiler, which takes seconds."""
+    """Take Adam's steps (Kingma, Ba, 2015)."""
 
-    def __init__(self, parameters: list[Tensor], lr: float) -> None:
-        self.parameters, self._rate = parameters, lr
-        self.moments = [
-            {"step": torch.zeros(()), "exp_avg": torch.zeros_like(p), "exp_avg_sq": torch.zeros_like(p)}
-            for p in parameters
-        ]
+    _MEAN, _SQUARE = 0.9, 0.999  # what is kept of both moments in a step
+    _LEAST = 1e-8
 
-    @torch.no_grad()
-    def step(self, share: float) -> None:
-        """Take one step at a share of the learning rate."""
-        steps, means, squares = ([row[name] for row in self.moments] for name in ("step", "exp_avg", "exp_avg_sq"))
-        adam(
-            self.parameters,
-            [_gradient(p) for p in self.parameters],
-            means,
-            squares,
-            [],
-            steps,
-            amsgrad=False,
-            beta1=0.9,
-            beta2=0.999,
-            lr=share * self._rate,
-            weight_decay=0.0,
-            eps=1e-8,
-            maximize=False,
-        )
+    def __init__(self, parameters: Parameters, lr: float) -> None:
+        self.moments = {
+            kind: {name: torch.zeros_like(value) for name, value in parameters.items()} for kind in ("mean", "square")
+        }
+        self._rate = lr
+
+    def step(self, parameters: Parameters, gradients: Parameters, share: float, number: int) -> None:
+        """Take one step at a share of the learning rate, in place; it is the `number`-th one."""
+        rate = share * self._rate / (1.0 - self._MEAN**number)
+        spread = math.sqrt(1.0 - self._SQUARE**number)
+        for name, mean in self.moments["mean"].items():
+            gradient, square, values = gradients[name], self.moments["square"][name], parameters[name]
+            mean.lerp_(gradient, 1.0 - self._MEAN)
+            square.mul_(self._SQUARE).addcmul_(gradient, gradient, value=1.0 - self._SQUARE)
+            values.addcdiv_(mean, square.sqrt().div_(spread).add_(self._LEAST), value=-rate)
 
 
 class TrainingOptimizer:
     """Run Muon and Adam side by side, with one schedule."""
 
     def __init__(self, network: InverseMap, config: TrainConfig) -> None:
-        hidden, others = list[Tensor](), list[Tensor]()
-        for p in network.parameters():
-            is_hidden = config.matrix_rate > 0.0 and p.ndim == 2 and p is not network.last.weight
-            (hidden if is_hidden else others).append(p)
-        self._parts: dict[str, Adam | Muon] = {"adam": Adam(others, config.learning_rate)}
-        if hidden:
-            self._parts["muon"] = Muon(hidden, config.matrix_rate)
-
-    def clear(self) -> None:
-        """Forget the gradients of the last step."""
-        for part in self._parts.values():
-            for parameter in part.parameters:
-                parameter.grad = None
-
-    def step(self, share: float) -> None:
-        """Take one step at a share of the learning rates."""
-        for part in self._parts.values():
-            part.step(share)
-
-    def tensors(self) -> Tensors:
-        """Return the moments of both optimisers, for a checkpoint."""
-        return {
-            f"{name}.{index}.{moment}": value
-            for name, part in self._parts.items()
-            for index, moments in enumerate(part.moments)
-            for moment, value in moments.items()
+        self._network, self._steps = network, 0
+        hidden = {
+            name: value
+            for name, value in network.parameters.items()
+            if config.matrix_rate > 0.0 and len(value.shape) == 2 and name != "last.weight"
+        }
+        others = {name: value for name, value in network.parameters.items() if name not in hidden}
+        self._parts: dict[str, Adam | Muon] = {
+            "adam": Adam(others, config.learning_rate),
+            "muon": Muon(hidden, config.matrix_rate),
         }
 
-    def restore(self, tensors: Tensors) -> None:
-        """Set the moments that `tensors` has returned."""
-        for key, value in self.tensors().items():
-            value.copy_(tensors[key])
+    def step(self, gradients: Parameters, share: float) -> None:
+        """Take one step at a share of the learning rates."""
+        self._steps += 1
+        for part in self._parts.values():
+            part.step(self._network.parameters, gradients, share, self._steps)
+
+    def state(self) -> dict[str, Floats]:
+        """Return copies of the moments of both optimisers, and the number of steps, for a checkpoint."""
+        return {key: back(moments[name]) for key, moments, name in self._moments()} | {"steps": np.array([self._steps])}
+
+    def restore(self, state: dict[str, Floats]) -> None:
+        """Set what `state` has returned."""
+        self._steps = int(state["steps"][0])
+        for key, moments, name in self._moments():
+            moments[name] = self._network.there(state[key])
+
+    def _moments(self) -> Iterable[tuple[str, Parameters, str]]:
+        """Yield a key for each moment, and the table and the name that it is kept under."""
+        for label, part in self._parts.items():
+            for kind, moments in part.moments.items():
+                for name in moments:
+                    yield f"{label}.{kind}.{name}", moments, name

@@ -11,10 +11,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-import torch
-from torch import Tensor
 
-from ..arrays import Array, IntArray
+from ..arrays import Array, Floats, IntArray
 from ..checkpoint import Checkpoints
 from ..config import Config, StageConfig
 from ..cube.cube import CubeLayout
@@ -28,9 +26,8 @@ from .optimizer import TrainingOptimizer
 from .training_points import TriangleSampler, stencils
 
 _log = logging.getLogger(__name__)
-State = dict[str, Tensor]
+State = dict[str, Floats]
 _CHECKPOINT, _CHECKPOINT_STEPS = "training", 100
-_MAPPED = 65_536  # points of `map_points` at a time
 _COMPARED_STEPS = 8  # the last ones of a race, whose mean distortions are compared
 _RACE_GAIN = 0.05  # share by which the turned G must be better, first in concavity and then in distortion
 
@@ -68,17 +65,12 @@ class Trainer:
         checkpoints: Checkpoints,
     ) -> None:
         self.config, self.seed = config, seed
-        self.device, self.dtype = torch.device(device), getattr(torch, dtype)
         self.vertices, self.faces, self.corners = vertices, faces, given_corners
         self.history, self.progress, self.checkpoints = history, progress, checkpoints
-        self.generator = torch.Generator()
-        first_weights = torch.Generator().manual_seed(seed % 2**63)
-        self.network = InverseMap(config.network, first_weights).to(device=self.device, dtype=self.dtype)
+        self.network = InverseMap(config.network, np.random.default_rng(seed), device, dtype)
         if config.train.whiten:
-            first = start_map(Solid(vertices, faces).lattice(config.train.cell))
-            self.network.affine.copy_(self._tensor(first))
-        inside = stencils(vertices, faces, config.train.cell, device=self.device, dtype=self.dtype)
-        self.objective = Objective(self.network, inside)
+            self.network.affine = self.network.there(start_map(Solid(vertices, faces).lattice(config.train.cell)))
+        self.objective = Objective(self.network, stencils(vertices, faces, config.train.cell))
 
     def run(self, *, give_up: bool = False) -> InverseMap | None:
         """Train all stages, or continue from a checkpoint; return the network at the best state of the last stage.
@@ -89,10 +81,10 @@ class Trainer:
         is raised instead.
         """
         given, limit = self.corners is not None, self.config.train.easy_loss
-        saved = self._saved()
+        saved = self.checkpoints.load(_CHECKPOINT)
         first = int(saved[1]["number"]) if saved else 0
         for number, stage in list(enumerate(self.config.stages))[first:]:
-            run = self._load_run(*saved) if saved else _Run(number, 0, self._state(), self._state())
+            run = self._load_run(*saved) if saved else self._new_run(number)
             try:
                 boundary = self._prepare(stage)
             except PathError as error:
@@ -115,7 +107,7 @@ class Trainer:
 
     def map(self, points: Array) -> Array:
         """Return G (m, 3) at points (m, 3), as float64."""
-        return map_points(self.network, points)
+        return self.network.at(points)
 
     def mapped(self) -> Array:
         """Return G at the surface's vertices, (n, 3), for the present network."""
@@ -133,17 +125,10 @@ class Trainer:
             surface = cut_surface(CubeLayout(vertices, faces, self.mapped(), len(vertices)), corners)
             vertices, faces = surface.layout.points, surface.layout.faces
             path, target, following = edge_targets(self.map(vertices), surface.paths)
-            paths = EdgePaths(self._index(path), self._tensor(target), self._index(following))
-            labels = self._index(surface.face_labels)
-        sampler = TriangleSampler(vertices, faces, self.config.train.triangles, self.device)
-        held = None if corners is None else self._index(corners)
-        return BoundaryData(self._tensor(vertices), self._index(faces), sampler, held, labels, paths)
-
-    def _index(self, numbers: IntArray) -> Tensor:
-        return torch.as_tensor(numbers, device=self.device)
-
-    def _tensor(self, values: Array) -> Tensor:
-        return torch.as_tensor(values, dtype=self.dtype, device=self.device)
+            paths = EdgePaths(path, target, following)
+            labels = surface.face_labels
+        sampler = TriangleSampler(vertices, faces, self.config.train.triangles)
+        return BoundaryData(vertices, faces, sampler, corners, labels, paths)
 
     def _misfit(self, stage: StageConfig) -> float:
         """Return the loss of a stage at its best state, without the distortion.
@@ -174,28 +159,31 @@ class Trainer:
         reach.
         """
         train, begun = self.config.train, len(self.history.rows)
-        away, start = self.mapped() - 0.5, self._state()
+        away, start = self.mapped() - 0.5, self.network.state()
         directions = away / np.maximum(np.linalg.norm(away, axis=1, keepdims=True), 1e-300)
         ball = CubeLayout(self.vertices, self.faces, directions, len(self.vertices))
         turn = best_turn(ball, np.random.default_rng(self.seed))
         as_it_is = concavity(ball)
         if concavity(replace(ball, places=ball.places @ turn.T)) > as_it_is - _RACE_GAIN * abs(as_it_is):
-            return _Run(number, 0, start, start), TrainingOptimizer(self.network, train)
+            return self._new_run(number), TrainingOptimizer(self.network, train)
         least, winner = math.inf, None
         for rotation, share in ((np.eye(3), 1.0), (turn, 1.0 - _RACE_GAIN)):
-            self.network.load_state_dict(start)
-            self.network.turn(self._tensor(rotation))
-            run, optimizer = _Run(number, 0, self._state(), self._state()), TrainingOptimizer(self.network, train)
+            self.network.restore(start)
+            self.network.turn(rotation)
+            run, optimizer = (
+                _Run(number, 0, self.network.state(), self.network.state()),
+                TrainingOptimizer(self.network, train),
+            )
             for _ in self._steps(run, boundary, optimizer, math.ceil(train.race * self.config.stages[number].steps)):
                 pass
             rows = self.history.rows[begun:]
             del self.history.rows[begun:]
             distortion = float(np.mean([terms["arap"] for *_, terms in rows[-_COMPARED_STEPS:]]))
             if distortion < share * least:
-                least, winner = distortion, (run, optimizer, self._state(), rows)
+                least, winner = distortion, (run, optimizer, self.network.state(), rows)
         assert winner is not None
         run, optimizer, state, rows = winner
-        self.network.load_state_dict(state)
+        self.network.restore(state)
         self.history.rows += rows
         return run, optimizer
 
@@ -209,7 +197,7 @@ class Trainer:
         except KeyboardInterrupt:
             self._save(run, optimizer)
             raise
-        self.network.load_state_dict(run.best)
+        self.network.restore(run.best)
 
     def _steps(self, run: _Run, boundary: BoundaryData, optimizer: TrainingOptimizer, until: int) -> Iterator[None]:
         """Take the steps of a stage up to the step `until`, and report each step."""
@@ -226,26 +214,19 @@ class Trainer:
 
     def _step(self, run: _Run, stage: StageConfig, boundary: BoundaryData, optimizer: TrainingOptimizer) -> None:
         """Take one step of the optimiser; the state changes only once the loss is known to be finite."""
-        self.generator.manual_seed((1_000_003 * self.seed + 100_003 * run.number + run.step) % 2**63)
-        optimizer.clear()
-        loss, folded, terms = self.objective(STAGES[stage.name], boundary, self.generator)
-        loss.backward()  # type: ignore[no-untyped-call]
-        value = float(loss.detach())
-        if not math.isfinite(value):
+        generator = np.random.default_rng([self.seed, run.number, run.step])
+        loss = self.objective(STAGES[stage.name], boundary, generator)
+        if not math.isfinite(loss.value):
             raise FloatingPointError(f"stage {stage.name}, step {run.step}: the loss is not finite")
-        if (folded, value) < run.best_key:
-            run.best_key, run.best = (folded, value), self._state()
-        optimizer.step(self._share(run.step / stage.steps))
-        self.history.add(stage.name, run.step, value, folded, terms)
+        if (loss.folded, loss.value) < run.best_key:
+            run.best_key, run.best = (loss.folded, loss.value), self.network.state()
+        optimizer.step(loss.gradient(), self._share(run.step / stage.steps))
+        self.history.add(stage.name, run.step, loss.value, loss.folded, loss.terms)
         run.step += 1
 
-    def _state(self) -> State:
-        return {name: value.clone() for name, value in self.network.state_dict().items()}
-
     def _save(self, run: _Run, optimizer: TrainingOptimizer) -> None:
-        parts = {"now": self.network.state_dict(), "start": run.start, "best": run.best}
-        tensors = {f"{part}.{name}": value for part, state in parts.items() for name, value in state.items()}
-        tensors |= {f"optimizer.{name}": value for name, value in optimizer.tensors().items()}
+        parts = {"now": self.network.state(), "start": run.start, "best": run.best, "optimizer": optimizer.state()}
+        arrays = {f"{part}.{name}": value for part, state in parts.items() for name, value in state.items()}
         state = {
             "number": run.number,
             "step": run.step,
@@ -253,30 +234,23 @@ class Trainer:
             "corners": None if self.corners is None else self.corners.tolist(),
             "history": self.history.rows,
         }
-        self.checkpoints.save(_CHECKPOINT, {name: t.detach().cpu().numpy() for name, t in tensors.items()}, state)
+        self.checkpoints.save(_CHECKPOINT, arrays, state)
 
-    def _saved(self) -> tuple[State, dict[str, Any]] | None:
-        """Return the tensors and the state of the checkpoint; None without a checkpoint.
+    def _new_run(self, number: int) -> _Run:
+        return _Run(number, 0, self.network.state(), self.network.state())
 
-        The tensors are copies: sums over memory in another layout than in the first run would have other rounding
-        errors.
-        """
-        if (saved := self.checkpoints.load(_CHECKPOINT)) is None:
-            return None
-        return {name: torch.tensor(array) for name, array in saved[0].items()}, saved[1]
-
-    def _load_run(self, tensors: State, state: dict[str, Any]) -> _Run:
+    def _load_run(self, arrays: State, state: dict[str, Any]) -> _Run:
         """Restore everything but the optimiser; leave the network as it was at the start of the stage."""
         self.corners = None if state["corners"] is None else np.array(state["corners"])
         self.history.rows[:] = [tuple(row) for row in state["history"]]
-        start, best = _part(tensors, "start"), _part(tensors, "best")
-        self.network.load_state_dict(start)
+        start, best = _part(arrays, "start"), _part(arrays, "best")
+        self.network.restore(start)
         folded, loss = state["best_key"]
         return _Run(state["number"], state["step"], start, best, (folded, loss))
 
-    def _load_progress(self, tensors: State, optimizer: TrainingOptimizer) -> None:
-        self.network.load_state_dict(_part(tensors, "now"))
-        optimizer.restore(_part(tensors, "optimizer"))
+    def _load_progress(self, arrays: State, optimizer: TrainingOptimizer) -> None:
+        self.network.restore(_part(arrays, "now"))
+        optimizer.restore(_part(arrays, "optimizer"))
 
     def _share(self, done: float) -> float:
         """Return the share of the learning rates, which falls along a cosine.
@@ -293,13 +267,6 @@ def start_map(points: Array) -> Array:
     return np.asarray((vectors * np.sqrt(values.prod() ** (1.0 / 3.0) / values)) @ vectors.T)
 
 
-def _part(tensors: State, prefix: str) -> State:
-    """Return the tensors whose names begin with `prefix` and a dot, under the rest of their names."""
-    return {key.removeprefix(f"{prefix}."): value for key, value in tensors.items() if key.startswith(f"{prefix}.")}
-
-
-@torch.no_grad()
-def map_points(network: InverseMap, points: Array) -> Array:
-    """Return G (m, 3) at points (m, 3) as float64, computed in blocks, on the network's device and in its precision."""
-    pieces = torch.as_tensor(points).to(network.affine)
-    return np.asarray(torch.cat([network(piece) for piece in torch.split(pieces, _MAPPED)]).double().cpu())
+def _part(arrays: State, prefix: str) -> State:
+    """Return the arrays whose names begin with `prefix` and a dot, under the rest of their names."""
+    return {key.removeprefix(f"{prefix}."): value for key, value in arrays.items() if key.startswith(f"{prefix}.")}

@@ -1,10 +1,10 @@
 """Draws the samples of the losses: interior stencils (section 4.4.2) and surface triangles, both with a seed."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
-import torch
-from torch import Tensor
+from scipy.sparse import csr_array
 
 from ..arrays import Array, IntArray
 from ..config import TrainConfig
@@ -14,6 +14,26 @@ from ..surface.solid import Solid
 # The 19 of 3^3 lattice offsets that first and second differences need, centre first.
 _STEPS = np.array(list(np.ndindex(3, 3, 3))) - 1
 OFFSETS = np.concatenate([_STEPS[np.count_nonzero(_STEPS, axis=1) == moved] for moved in range(3)])
+_PLACES = {tuple(offset): place for place, offset in enumerate(OFFSETS.tolist())}
+_UNITS = np.eye(3, dtype=np.int64)
+_PAIRS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))  # directions of the second differences, in their order
+
+
+def _differences() -> tuple[Array, Array]:
+    """Return the weights of the stencil's points in first (3, 19) and in second differences (6, 19), for spacing 1."""
+    first, second = np.zeros((3, 19)), np.zeros((6, 19))
+    for a in range(3):
+        for side in (-1, 1):
+            first[a, _PLACES[tuple(side * _UNITS[a])]] = 0.5 * side
+    for row, (a, b) in enumerate(_PAIRS):
+        if a == b:
+            second[row, 0] = -2.0
+            second[row, [_PLACES[tuple(side * _UNITS[a])] for side in (-1, 1)]] = 1.0
+        else:
+            for left, right in np.ndindex(2, 2):
+                place = _PLACES[tuple((2 * left - 1) * _UNITS[a] + (2 * right - 1) * _UNITS[b])]
+                second[row, place] = 0.25 * (2 * left - 1) * (2 * right - 1)
+    return first, second
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,57 +43,55 @@ class Stencils:
     nodes: (n, 3), positions. index: (r, 19) into nodes, in the order of OFFSETS. cell: the lattice spacing h.
     """
 
-    nodes: Tensor
-    index: Tensor
+    nodes: Array
+    index: IntArray
     cell: float
 
-    def shifted(self, generator: torch.Generator) -> Tensor:
+    def shifted(self, generator: np.random.Generator) -> Array:
         """Return the nodes, all moved by one random vector of [-h/2, h/2]^3."""
-        shift = torch.rand(3, generator=generator, dtype=self.nodes.dtype) - 0.5
-        return self.nodes + (self.cell * shift).to(self.nodes.device)
+        return self.nodes + self.cell * generator.uniform(-0.5, 0.5, 3)
+
+    @cached_property
+    def differences(self) -> csr_array:
+        """Return the matrix (9 r, n) from values at the nodes to the derivatives at the stencils.
+
+        Its rows are three first derivatives of all stencils, then three pure and three mixed second ones.
+        """
+        first, second = _differences()
+        weights = np.concatenate([first / self.cell, second / self.cell**2])
+        kind, place = np.nonzero(weights)
+        count = len(self.index)
+        rows = count * kind[:, None] + np.arange(count)
+        values = np.broadcast_to(weights[kind, place][:, None], rows.shape)
+        columns = self.index[:, place].T
+        return csr_array((values.ravel(), (rows.ravel(), columns.ravel())), shape=(9 * count, len(self.nodes)))
 
 
-def gather(rows: Tensor, index: Tensor) -> Tensor:
-    """Return rows[index] for rows (n, k) and an index of any shape, with a repeatable gradient.
-
-    The gradient of plain indexing adds repeated rows in an order that depends on the threads.
-    """
-    return rows.index_select(0, index.flatten()).view(*index.shape, rows.shape[1])
-
-
-def stencils(vertices: Array, faces: IntArray, cell: float, *, device: torch.device, dtype: torch.dtype) -> Stencils:
+def stencils(vertices: Array, faces: IntArray, cell: float) -> Stencils:
     """Return stencils around every lattice point inside the surface or within h/2 of it, to cover it at any shift."""
     solid = Solid(vertices, faces)
     index = solid.lattice_near(cell, cell / 2.0)
     centres = index[solid.signed_distances(np.asarray(cell * index, dtype=np.float64)) < cell / 2.0]
     needed, inverse = np.unique((centres[:, None, :] + OFFSETS).reshape(-1, 3), axis=0, return_inverse=True)
-    return Stencils(
-        torch.as_tensor(needed * cell, dtype=dtype, device=device),
-        torch.as_tensor(inverse.reshape(-1, len(OFFSETS)), device=device),
-        cell,
-    )
+    return Stencils(needed * cell, inverse.reshape(-1, len(OFFSETS)), cell)
 
 
 class TriangleSampler:
     """Draw triangles with probability proportional to area, or all triangles where there are at most `count`."""
 
-    def __init__(self, vertices: Array, faces: IntArray, count: int, device: torch.device) -> None:
+    def __init__(self, vertices: Array, faces: IntArray, count: int) -> None:
         _, area = normals_and_areas(vertices, faces)
-        self._cumulative = torch.as_tensor(np.cumsum(area / area.sum()))
+        self._cumulative = np.cumsum(area / area.sum())
         self._count = min(count, len(faces))
-        self._device = device
 
-    def draw(self, generator: torch.Generator) -> Tensor:
+    def draw(self, generator: np.random.Generator) -> IntArray:
         """Return indices (count,) of triangles by systematic sampling: one random offset along the cumulated area."""
         if self._count == len(self._cumulative):
-            return torch.arange(self._count, device=self._device)
-        start = torch.rand(1, generator=generator, dtype=torch.float64)
-        ticks = (torch.arange(self._count) + start) / self._count
-        picks = torch.searchsorted(self._cumulative, ticks).clamp(max=len(self._cumulative) - 1)
-        return picks.to(self._device)
+            return np.arange(self._count)
+        ticks = (np.arange(self._count) + generator.random()) / self._count
+        return np.searchsorted(self._cumulative, ticks).clip(max=len(self._cumulative) - 1)
 
 
 def points_of_a_step(vertices: Array, faces: IntArray, train: TrainConfig) -> int:
     """Return the number of points that the network maps in a step; vertices (n, 3) at volume 1, faces (m, 3)."""
-    nodes = stencils(vertices, faces, train.cell, device=torch.device("cpu"), dtype=torch.float32).nodes
-    return len(nodes) + min(len(vertices), 3 * train.triangles)
+    return len(stencils(vertices, faces, train.cell).nodes) + min(len(vertices), 3 * train.triangles)

@@ -14,6 +14,8 @@ from ..optimization.phases import RAMP, Polish, Schedule, Separate, Shape, Unfol
 from ..progress import timed
 from ..surface.solid import Solid
 from ..threads import one_blas_thread
+from ..training.target_shapes import nearest_on_cube
+from ..training.training_points import points_of_a_step
 from .cost import Cost
 from .growth import GROWTH, LAST, STIFF
 from .mapping_task import MappingTask
@@ -37,13 +39,13 @@ class Network(OneCube):
 
         None is returned if the training finds the shape too hard, and other ways may follow.
         """
-        from ..training.backend import one_thread_an_operation  # they load torch, which takes a second
-        from ..training.trainer import Trainer, map_points
+        from ..training.backend import one_thread_an_operation
+        from ..training.trainer import Trainer  # it loads torch, which takes a second
 
         others = _has_others(task)
         if others and task.config.train.easy_loss == 0.0:  # every shape counts as hard
             return None
-        with timed(task.seconds, "train"), one_thread_an_operation():
+        with timed(task.seconds, "train"), one_thread_an_operation(), one_blas_thread():
             trainer = Trainer(
                 *task.mesh,
                 task.config,
@@ -60,17 +62,15 @@ class Network(OneCube):
         spline = task.config.spline
         vertices, faces = task.mesh
         with timed(task.seconds, "fit"), one_thread_an_operation(), one_blas_thread():
-            mapped = map_points(network, vertices)
+            mapped = network.at(vertices)
             fit = correspondence(task, _layout(mapped, trainer.corners, task), COARSE)
             inside = Solid(vertices, faces).lattice(spline.fit_cell)
-            places = map_points(network, inside).clip(0.0, 1.0)
+            places = network.at(inside).clip(0.0, 1.0)
             first = first_spline(inside, places, fit)
         return optimized(first, fit, schedule(spline), task, checkpoints)
 
     def cost(self, task: MappingTask) -> Cost:
         """Return the cost of the training and the rounds; of a hard surface that of a growth after the first stage."""
-        from ..training.training_points import points_of_a_step  # which loads torch
-
         config, surface = task.config, task.surface
         points = points_of_a_step(surface.unit_vertices, surface.faces, config.train)
         cube = Cost.of_cube(config, task.own)
@@ -112,10 +112,8 @@ def _layout(mapped: Array, corners: IntArray | None, task: MappingTask) -> CubeL
     The layout of nearest points is closer to the network's map. The layout by patches is used where flipped triangles
     remain in the other; it always succeeds where the edges can be traced.
     """
-    from ..training.target_shapes import nearest_places
-
     layout = CubeLayout(*task.mesh, mapped, task.own)
-    untangled = untangle(nearest_places(mapped), layout.faces)
+    untangled = untangle(nearest_on_cube(mapped), layout.faces)
     if flipped(untangled, layout.faces).mean() > _FEW_FLIPS:
         try:
             chosen = choose_corners(mapped) if corners is None else corners

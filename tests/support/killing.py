@@ -16,7 +16,6 @@ import time
 from pathlib import Path
 
 import numpy as np
-import torch
 from mesh_files import obj
 from small_run import FEW, small_surface, tiny_config
 
@@ -79,7 +78,6 @@ def main() -> int:
     parser.add_argument("--moments", type=int, default=30)
     parser.add_argument("--seed", type=int, default=0)
     options = parser.parse_args()
-    torch.set_num_threads(1)
     RunFolder.draw = lambda *_, **__: None  # the figures come after the volume and cost most of so short a run
     MapOptions.config = lambda _: tiny_config()
     SampledBoundary.of.__func__.__defaults__ = FEW

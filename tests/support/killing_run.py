@@ -13,7 +13,6 @@ import sys
 import tempfile
 from pathlib import Path
 
-import torch
 from killing import FORK, run, said_of
 from mesh_files import obj
 from plane_bodies import arrays
@@ -95,7 +94,6 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--stages", nargs="+", default=list(STAGES), choices=list(STAGES))
     stages = parser.parse_args().stages
-    torch.set_num_threads(1)
     RunFolder.draw = lambda *_, **__: None
     SampledBoundary.of.__func__.__defaults__ = FEW
     with tempfile.TemporaryDirectory() as place:

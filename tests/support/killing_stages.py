@@ -15,7 +15,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-import torch
 import trimesh
 from killing import finished, said_of, started
 from mesh_files import obj
@@ -114,7 +113,6 @@ def main() -> int:
     parser.add_argument("--bodies", nargs="+", default=[stage.body for stage in STAGES])
     bodies = parser.parse_args().bodies
     asked = [stage for stage in STAGES if stage.body in bodies]
-    torch.set_num_threads(1)
     sphere._CHECKPOINT_SECONDS = -1.0  # one after each step
     RunFolder.draw = lambda *_, **__: None
     SampledBoundary.of.__func__.__defaults__ = FEW

@@ -6,7 +6,7 @@ from parameterize.cube.cube import nearest_faces
 from parameterize.spline.bspline import greville, open_uniform_knots
 from parameterize.spline.spline_map import ControlNets
 from parameterize.spline.volume import BSplineVolume
-from parameterize.training.target_shapes import nearest_places
+from parameterize.training.target_shapes import nearest_on_cube
 
 DEGREE = 3
 KNOTS = (open_uniform_knots(6, DEGREE), open_uniform_knots(5, DEGREE), open_uniform_knots(7, DEGREE))
@@ -25,5 +25,5 @@ def as_volume(control):
 
 
 def on_the_cube(count, seed=0):
-    parameters = nearest_places(np.random.default_rng(seed).uniform(-0.2, 1.2, (count, 3)))
+    parameters = nearest_on_cube(np.random.default_rng(seed).uniform(-0.2, 1.2, (count, 3)))
     return parameters, nearest_faces(parameters)
