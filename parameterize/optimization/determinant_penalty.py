@@ -122,15 +122,17 @@ class BlockDeterminants:
         """
         taken = 0.0
 
-        def piece(spans: _PenaltySpans) -> Callable[[Floats], tuple[IntArray, Floats]]:
+        def piece(spans: _PenaltySpans) -> Callable[[Floats], tuple[IntArray, Floats]] | None:
             nonlocal taken
             found = self._short_rows(control, spans, np.float32)
+            if not len(found.rows):
+                return None
             taken += found.rows.nbytes
             if taken <= _MOST_KEPT:
                 return lambda x: _product(found, x)
             return lambda x: _product(self._short_rows(control, spans, np.float32), x)
 
-        return PiecewiseOperator(in_parallel(piece, self._pieces), _collected)
+        return PiecewiseOperator([one for one in in_parallel(piece, self._pieces) if one is not None], _collected)
 
     def _short_rows(self, control: Array, spans: _PenaltySpans, dtype: type[np.floating] = np.float64) -> _Rows:
         """Return the rows of the coefficients that lie below the floor on some spans."""
