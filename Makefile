@@ -3,7 +3,8 @@ PYTHON ?= python3
 BIN := .venv/bin
 RUN := .venv/.run
 DEV := .venv/.dev
-INSTALL := $(BIN)/python -m pip install -c constraints.txt
+# Python compiles the modules that it loads: --no-compile, as most are never loaded.
+INSTALL := $(BIN)/python -m pip install --no-compile -c constraints.txt
 
 .PHONY: setup setup-dev demo docs test suite lint validate stress fuzz audit disturbed
 
@@ -11,16 +12,13 @@ setup: $(RUN)
 
 setup-dev: $(DEV)
 
-# What running needs. An environment that is there is kept. torch first: it decides which numpy and which shared
-# libraries the rest meets. A small run at the end shows that all is there (3: not certified), and
-# compiles what later runs then load.
+# What running needs. An environment that is there is kept. The kernels are compiled ahead of the first run, which would
+# wait for them.
 $(RUN): pyproject.toml constraints.txt
 	$(PYTHON) -c 'import sys; sys.exit("Python 3.11 or newer is needed, this is " + sys.version) if sys.version_info < (3, 11) else None'
 	test -x $(BIN)/python || $(PYTHON) -m venv .venv
-	$(INSTALL) torch==2.13.0
 	$(INSTALL) -e .
-	out=$$(mktemp -d); $(BIN)/iga-nn run poisson bean --control-points 10 --steps-factor 0.02 --out $$out/bean; \
-		code=$$?; rm -r $$out; test $$code -eq 0 -o $$code -eq 3
+	$(BIN)/python -P -m iga_nn.compile_kernels
 	touch $@
 
 # The development tools and the extras on top of it: pip leaves alone what is there.

@@ -137,12 +137,13 @@ def _faces(body: Body, part: Sequence[int]) -> Iterator[Any]:
 
 def _surface(net: Array, weights: Array, rows: Sequence[tuple[Array, int]]) -> Any:
     """Return the surface (Geom_BSplineSurface) of control points (a, b, 3), weights (a, b), knots and degrees."""
-    from OCP.collections import Array1_double, Array1_int, Array2_double, Array2_gp_Pnt
     from OCP.Geom import Geom_BSplineSurface
     from OCP.gp import gp_Pnt
+    from OCP.TColgp import TColgp_Array2OfPnt
+    from OCP.TColStd import TColStd_Array1OfInteger, TColStd_Array1OfReal, TColStd_Array2OfReal
 
-    poles = Array2_gp_Pnt(1, net.shape[0], 1, net.shape[1])
-    factors = Array2_double(1, net.shape[0], 1, net.shape[1])
+    poles = TColgp_Array2OfPnt(1, net.shape[0], 1, net.shape[1])
+    factors = TColStd_Array2OfReal(1, net.shape[0], 1, net.shape[1])
     for i, row in enumerate(net.tolist(), 1):
         for j, (x, y, z) in enumerate(row, 1):
             poles.SetValue(i, j, gp_Pnt(x, y, z))
@@ -150,7 +151,7 @@ def _surface(net: Array, weights: Array, rows: Sequence[tuple[Array, int]]) -> A
     knots, counts = [], []
     for row, _ in rows:
         values, times = np.unique(row, return_counts=True)
-        own, multiplicities = Array1_double(1, len(values)), Array1_int(1, len(values))
+        own, multiplicities = TColStd_Array1OfReal(1, len(values)), TColStd_Array1OfInteger(1, len(values))
         for place, (value, count) in enumerate(zip(values.tolist(), times.tolist(), strict=True), 1):
             own.SetValue(place, value)
             multiplicities.SetValue(place, count)

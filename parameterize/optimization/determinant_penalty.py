@@ -238,8 +238,12 @@ def _bezier_points(control: Array, first: IntArray, weights: Array) -> Array:
     for s in range(spans):
         u, v, w = first[s]
         for c in range(3):
-            points[s, c] = control[c, u : u + n, v : v + n, w : w + n].copy().ravel()
-            _along_axes(points[s, c], weights[s, 0], weights[s, 1], weights[s, 2])
+            field = points[s, c]
+            for i in range(n):
+                for j in range(n):
+                    for k in range(n):
+                        field[(i * n + j) * n + k] = control[c, u + i, v + j, w + k]
+            _along_axes(field, weights[s, 0], weights[s, 1], weights[s, 2])
     return points
 
 

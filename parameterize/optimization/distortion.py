@@ -8,7 +8,7 @@ import numpy as np
 from scipy.ndimage import uniform_filter
 
 from ..arrays import Array, Floats, Knots
-from ..quality.rotations import closest_rotations, cofactors_and_determinants, dots, least_eigenvalues, squared_norms
+from ..quality.rotations import closest_rotations, cofactors_and_determinants, least_eigenvalues, squared_norms
 from ..spline.spline_map import ControlNets
 from ..threads import in_parallel
 from .operators import PiecewiseOperator
@@ -177,7 +177,9 @@ def _stretches(rotation: Floats, jacobian: Floats) -> Floats:
     out = np.zeros_like(jacobian)
     for a in range(3):
         for b in range(3):
-            out[a, b] = dots(rotation[:, a], jacobian[:, b])
+            for c in range(3):
+                for i in range(out.shape[2]):
+                    out[a, b, i] += rotation[c, a, i] * jacobian[c, b, i]
     return out
 
 

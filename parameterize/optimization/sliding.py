@@ -11,6 +11,7 @@ from functools import cached_property
 import numba
 import numpy as np
 
+from ..array_copies import write
 from ..arrays import Array, IntArray, Knots, Mask
 from ..cube.cube import axis_and_side, damped_solution, nearest_faces, tangent_axes
 from ..cube.flips import new_flips, unflip, untangle, untangle_whole
@@ -228,7 +229,7 @@ def _slid(
     FaceWindow.
     """
     goal, parameters, cube_faces = parameters.copy(), parameters.copy(), cube_faces.copy()
-    old, before = (indices, in_a, in_b), parameters.copy()
+    before, (old, old_a, old_b) = parameters.copy(), (indices, in_a, in_b)
     indices, in_a, in_b = indices.copy(), in_a.copy(), in_b.copy()
     found = np.empty((len(points), 3, 3))
     for n in range(len(points)):
@@ -258,8 +259,11 @@ def _slid(
         for c in range(3):
             after += (found[n, 0, c] - points[n, c]) ** 2
         if after > square:
-            parameters[n], cube_faces[n] = before[n], face
-            indices[n], in_a[n], in_b[n] = old[0][n], old[1][n], old[2][n]
+            cube_faces[n] = face
+            write(before[n], parameters[n])
+            write(old[n], indices[n])
+            write(old_a[n], in_a[n])
+            write(old_b[n], in_b[n])
     return goal, parameters, cube_faces, indices, in_a, in_b
 
 

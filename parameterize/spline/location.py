@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial import cKDTree
 
+from ..array_copies import write
 from ..arrays import Array, IntArray, Knots, Mask
 from ..threads import in_parallel
 from .bernstein import extraction
@@ -307,7 +308,9 @@ def _searched(
                 break
             if not _holds(low[s], high[s], points[m]):
                 continue
-            stack[0], boxes[0], levels[0] = nets[s], ends[s % len(ends)], 0
+            write(nets[s], stack[0])
+            write(ends[s % len(ends)], boxes[0])
+            levels[0] = 0
             size, margin = 1, CLOSE * diagonals[patch]
             while size and visits < _VISITS:
                 size -= 1
@@ -355,7 +358,9 @@ def _halve(point: Array, stack: Array, boxes: Array, levels: IntArray, top: int,
         net = right if side else left
         _enclose(net, margin, low, high)
         if _holds(low, high, point):
-            stack[size], boxes[size], levels[size] = net, box, level
+            write(net, stack[size])
+            write(box, boxes[size])
+            levels[size] = level
             boxes[size, 1 - side, axis] = middle
             size += 1
     return size

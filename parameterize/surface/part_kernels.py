@@ -39,7 +39,7 @@ def nearest_in_triangles(points: Array, vertices: Array, faces: IntArray) -> Arr
     for i in range(len(points)):
         corners = vertices[faces[i]]
         normal = np.cross(corners[1] - corners[0], corners[2] - corners[0])
-        size, inside, least = np.dot(normal, normal), True, np.inf
+        size, inside, nearest, least = np.dot(normal, normal), True, corners[0], np.inf
         for k in range(3):
             start, along = corners[k], corners[(k + 1) % 3] - corners[k]
             away = points[i] - start
@@ -48,9 +48,11 @@ def nearest_in_triangles(points: Array, vertices: Array, faces: IntArray) -> Arr
             foot = start + share * along
             squared = np.dot(points[i] - foot, points[i] - foot)
             if squared < least:
-                found[i], least = foot, squared
+                nearest, least = foot, squared
         if inside and size > 0.0:
-            found[i] = points[i] - (np.dot(points[i] - corners[0], normal) / size) * normal
+            nearest = points[i] - (np.dot(points[i] - corners[0], normal) / size) * normal
+        for d in range(3):
+            found[i, d] = nearest[d]
     return found
 
 

@@ -16,6 +16,7 @@ from .kernels import (
     spread,
     spread_plane,
     tensor_factors,
+    transpose,
     turn,
 )
 
@@ -98,7 +99,7 @@ def spread_fields(fields: Array, kinds: IntArray, tables: Tables, slopes: tuple[
         for c in range(fields.shape[1]):
             turned = np.zeros((n_w, fields.shape[3]))
             spread(first_w[kind], w[kind, d_w], functions_w, fields[m, c], turned)
-            lines[:, :] = turned.T
+            transpose(turned, lines)
             spread(first_v[kind], v[kind, d_v], functions_v, lines, result[m, c])
 
 

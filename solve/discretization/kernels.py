@@ -58,6 +58,14 @@ def spread(first: IntArray, basis: Array, functions: Functions, source: Array, r
 
 
 @compiled
+def transpose(source: Array, result: Array) -> None:
+    """Write a matrix, transposed, to `result`; numba's own assignment also compiles the words of its error: seconds."""
+    for i in range(result.shape[0]):
+        for j in range(result.shape[1]):
+            result[i, j] = source[j, i]
+
+
+@compiled
 def evaluate_lines(coefficients: Array, point: int, tables: Tables, result: Array) -> None:
     """Contract a spline (n_u, n_v, n_w) in u and v: write its value, d/du and d/dv to result (3, n_w, q_v).
 
@@ -71,7 +79,7 @@ def evaluate_lines(coefficients: Array, point: int, tables: Tables, result: Arra
     lines = np.empty((result.shape[2], n_w))
     for place in range(3):  # value, d/du, d/dv
         contract(first_v, v[place // 2], functions_v, planes[place % 2], lines)
-        result[place, :, :] = lines.T
+        transpose(lines, result[place])
 
 
 @compiled
@@ -101,7 +109,7 @@ def spread_plane(field: Array, point: int, tables: Tables, has_value: bool, resu
             spread(first_w, w[0], functions_w, field[place], turned)
         if place == 0:
             spread(first_w, w[1], functions_w, field[3], turned)
-        lines[:, :] = turned.T
+        transpose(turned, lines)
         spread(first_v, v[place // 2], functions_v, lines, planes[place % 2])
     for d in range(2):
         spread(here, u[d, point : point + 1], functions_u, planes[d].reshape(1, -1), flat)
