@@ -7,6 +7,7 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
+from threading import local
 from types import MappingProxyType
 from typing import Any, Self
 
@@ -27,6 +28,7 @@ LINE_WIDTH = 1.6  # pixels
 NEARER_LINES, NEARER_MARKS = 0.003, 0.01  # of the scene's size, towards the viewer: keeps them before a surface
 NAMELESS: Mapping[str, Array] = MappingProxyType({})
 LETTERS = 15  # pixels
+_WINDOWS = local()
 ROOM = 1.3  # of the picture's scale, for axes and their numbers
 REMEDY = "apt-get install --no-install-recommends libegl1 libgl1-mesa-dri"
 CANNOT_DRAW = f"VTK cannot draw on this machine; remedy: {REMEDY}"
@@ -136,8 +138,7 @@ def draw(
     """
     import pyvista
 
-    plotter: Any = pyvista.Plotter(off_screen=True, window_size=list(pixels), lighting="none")
-    plotter.set_background("white")
+    plotter = _empty_plotter(pixels)
     for lit, opacity in dict.fromkeys((patch.lit, patch.opacity) for patch in patches):
         plotter.add_mesh(
             _mesh([patch for patch in patches if (patch.lit, patch.opacity) == (lit, opacity)]),
@@ -168,9 +169,26 @@ def draw(
     if unit is not None:
         _add_axes(plotter, cloud, unit)
     plotter.add_light(pyvista.Light(light_type="headlight", intensity=0.9))
+    plotter.suppress_rendering = False
+    plotter.render()
     image: NDArray[np.uint8] = plotter.screenshot(return_img=True)
-    plotter.close()
     return image
+
+
+def _empty_plotter(pixels: tuple[int, int]) -> Any:
+    """Return a plotter with an empty scene; a thread has one for each size: a new window costs more than its picture.
+
+    Windows of EGL belong to the thread that opens them.
+    """
+    import pyvista
+
+    plotters: dict[tuple[int, int], Any] = _WINDOWS.__dict__
+    if pixels not in plotters:
+        plotters[pixels] = pyvista.Plotter(off_screen=True, window_size=list(pixels), lighting="none")
+        plotters[pixels].set_background("white")
+    plotters[pixels].suppress_rendering = True  # until the scene is complete
+    plotters[pixels].clear()
+    return plotters[pixels]
 
 
 def _mesh(patches: Sequence[Patch]) -> Any:
