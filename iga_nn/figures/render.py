@@ -28,10 +28,19 @@ LINE_WIDTH = 1.6  # pixels
 NEARER_LINES, NEARER_MARKS = 0.003, 0.01  # of the scene's size, towards the viewer: keeps them before a surface
 NAMELESS: Mapping[str, Array] = MappingProxyType({})
 LETTERS = 15  # pixels
-_WINDOWS = local()
 ROOM = 1.3  # of the picture's scale, for axes and their numbers
 REMEDY = "apt-get install --no-install-recommends libegl1 libgl1-mesa-dri"
 CANNOT_DRAW = f"VTK cannot draw on this machine; remedy: {REMEDY}"
+
+
+class _Windows(local):
+    """Hold the open windows of a thread by their size: a window of EGL draws in the thread that opens it."""
+
+    def __init__(self) -> None:
+        self.plotters: dict[tuple[int, int], Any] = {}
+
+
+_WINDOWS = _Windows()
 
 
 @dataclass(frozen=True, eq=False)
@@ -176,13 +185,10 @@ def draw(
 
 
 def _empty_plotter(pixels: tuple[int, int]) -> Any:
-    """Return a plotter with an empty scene; a thread has one for each size: a new window costs more than its picture.
-
-    Windows of EGL belong to the thread that opens them.
-    """
+    """Return a plotter with an empty scene, one for each size: a new window costs more than its picture."""
     import pyvista
 
-    plotters: dict[tuple[int, int], Any] = _WINDOWS.__dict__
+    plotters = _WINDOWS.plotters
     if pixels not in plotters:
         plotters[pixels] = pyvista.Plotter(off_screen=True, window_size=list(pixels), lighting="none")
         plotters[pixels].set_background("white")

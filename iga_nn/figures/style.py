@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 from matplotlib import colormaps
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
@@ -160,5 +161,8 @@ def save(figure: Figure, path: str | Path | None, title: str = "") -> Figure:
         figure.suptitle(title, fontsize=14)
     if path is not None:
         with replacing(Path(path)) as temporary:
-            figure.savefig(temporary)
+            if Path(path).suffix == ".png":
+                FigureCanvasAgg(figure).print_png(temporary)  # type: ignore[no-untyped-call]  # `savefig` draws it twice
+            else:
+                figure.savefig(temporary)
     return figure
