@@ -7,6 +7,7 @@ as it is now and with what else runs on it, with that one. docs/benchmarks/forec
 import os
 import time
 from collections.abc import Callable, Sequence
+from functools import cache
 
 import numpy as np
 
@@ -25,13 +26,19 @@ PARTS, SMOOTH, SHARP = (8.0, 100.0), (20.0, 110.0), (80.0, 480.0)
 def pace(clock: Clock = time.perf_counter) -> float:
     """Return how many seconds now pass in a second of the numbers of this module.
 
-    Of the machine that is the time of `work`; of what else runs on it the system's mean over a minute, if it has one:
-    a few tenths of a second say little of the minutes to come.
+    Of the machine that is the time of `work`, measured once; of what else runs on it the system's mean over a minute,
+    if it has one: a few tenths of a second say little of the minutes to come.
     """
     if clock is not time.perf_counter or not hasattr(os, "getloadavg"):
         return fastest(work, clock) / REFERENCE
     crowd = max(1.0, os.getloadavg()[0] / (os.cpu_count() or 1))
-    return crowd * fastest(work, time.process_time) / REFERENCE
+    return crowd * _of_machine() / REFERENCE
+
+
+@cache
+def _of_machine() -> float:
+    """Return the processor seconds of `work` on this machine."""
+    return fastest(work, time.process_time)
 
 
 def work() -> float:
