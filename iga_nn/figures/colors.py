@@ -5,10 +5,11 @@ Nothing here loads the figures of matplotlib, which take longer than a view is m
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import cycle, islice
 
 import numpy as np
 from matplotlib import colormaps
-from matplotlib.colors import LogNorm, Normalize, to_hex
+from matplotlib.colors import LogNorm, Normalize, to_hex, to_rgb
 
 from parameterize.arrays import Array, Mask
 from parameterize.spline.body import BodyLike, as_body
@@ -17,6 +18,7 @@ from parameterize.spline.volume import FACE_NAMES
 MAP = "viridis"  # colour map; perceptually uniform
 FACE_COLORS = ("#4477aa", "#66ccee", "#228833", "#ccbb44", "#ee6677", "#aa3377")  # also distinct for the colour-blind
 PATCH_COLORS = tuple(to_hex(color) for color in colormaps["tab20"].colors)  # type: ignore[attr-defined]
+REST = "0.82"  # the grey of a surface outside of all regions
 MOST_NAMED = 31  # patches: of more, too many have the same colour for a legend
 
 DECADES = 1e-4  # lower end of a logarithmic range over the largest error of the best mesh
@@ -56,6 +58,12 @@ def color_labels(body: BodyLike) -> list[tuple[str, str]]:
         return []
     alike = [names[i :: len(PATCH_COLORS)] for i in range(min(len(names), len(PATCH_COLORS)))]
     return [(color, ", ".join(each)) for color, each in zip(PATCH_COLORS, alike, strict=False)]
+
+
+def region_colors(count: int) -> Array:
+    """Return `count` colours, and last the colour of the rest, (count + 1, 3)."""
+    chosen = islice(cycle(colormaps["tab10"].colors), count)  # type: ignore[attr-defined]
+    return np.array([*map(to_rgb, chosen), to_rgb(REST)])
 
 
 @dataclass(frozen=True)

@@ -1,12 +1,9 @@
 """Draws regions of a boundary, each in its colour and named: on a solid, and on the surface of a part."""
 
 from collections.abc import Sequence
-from itertools import cycle, islice
 from pathlib import Path
 
 import numpy as np
-from matplotlib import colormaps
-from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch as Swatch
 
@@ -17,6 +14,7 @@ from parameterize.surface.surface import Surface
 from solve.forms.conditions import Condition
 from solve.forms.region import Region
 
+from .colors import region_colors
 from .fields import outer_faces, points_of
 from .first_view import best_sides, shown_from
 from .outline import edge_patch, outline_of
@@ -24,7 +22,6 @@ from .region_numbers import first_of, numbers_of
 from .render import Patch, View
 from .style import panels_of, save, show, show_around
 
-REST = "0.82"  # the grey of the surface outside of all regions
 MOST_PANELS, COLUMNS = 9, 3  # pictures of regions
 GLASS = 0.18  # opacity of a body around a region that is hidden
 CELLS = 40_000  # of a surface: large triangles are divided into as many
@@ -95,12 +92,6 @@ def _grid(triangle: Array, side: int) -> Array:
     along = np.linspace(0.0, 1.0, side + 1)
     a, b, c = triangle
     return np.asarray(a + along[:, None, None] * (b - a + along[None, :, None] * (c - b)))
-
-
-def region_colors(count: int) -> Array:
-    """Return `count` colours, and last the colour of the rest, (count + 1, 3)."""
-    chosen = islice(cycle(colormaps["tab10"].colors), count)  # type: ignore[attr-defined]
-    return np.array([*map(to_rgb, chosen), to_rgb(REST)])
 
 
 def _short(name: str) -> str:

@@ -11,11 +11,11 @@ from parameterize.spline.body import BodyLike, as_body
 from solve.field import FieldOnBody
 from solve.singular import SingularPlaces
 
+from ..figures.colors import region_colors
 from ..figures.fields import points_of
 from ..figures.first_view import conditions_of
 from ..figures.outline import is_by_face, outline
 from ..figures.region_numbers import numbers_of
-from ..figures.regions import region_colors
 from .packed import Drawn, numbered
 
 MOST_MARKS = 3000  # of singular places
