@@ -41,7 +41,6 @@ from .arguments import (
     for_each_problem,
     with_values,
 )
-from .progress import shown_batch, shown_progress
 from .refusal import refusal
 
 if TYPE_CHECKING:
@@ -85,6 +84,7 @@ def run_problem(
 def _run(mesh: str, output: OutputOptions, mapping: MapOptions, problem_options: ProblemOptions | None = None) -> int:
     """Parameterize a surface, solve a problem on the volume, print the verdict and return the exit code."""
     from ..workflow import pipeline
+    from .progress import shown_progress
 
     with shown_progress(output.quiet) as progress:
         outcome = pipeline.parameterize_to(
@@ -120,6 +120,7 @@ def run_many(
     from ..batch.surfaces import demand_surfaces
     from ..report import document as reports
     from .answer import batch_exit_code
+    from .progress import shown_batch
 
     demand_surfaces(surfaces, list(PROBLEMS))
     if output.out is None:
@@ -161,6 +162,7 @@ def solve_problem(
         device: where the linear system is solved; cuda takes symmetric laws that are scalar, or constant as elasticity.
     """
     from ..workflow import mpi_job, pipeline
+    from .progress import shown_progress
 
     with shown_progress(output.quiet):
         comm = mpi_job.all_processes() if mpi else None
@@ -183,6 +185,7 @@ def study_volume(
     The problem has an exact solution. Results go to STEM-study in the current folder, unless --out names another.
     """
     from ..workflow import pipeline
+    from .progress import shown_progress
 
     with shown_progress(output.quiet):
         outcome, table = pipeline.study_to(
@@ -201,6 +204,7 @@ def find_modes(
     the current folder, unless --out names another.
     """
     from ..workflow import pipeline
+    from .progress import shown_progress
 
     with shown_progress(output.quiet):
         outcome, table = pipeline.modes_to(volume, modes_options=modes, **output.folder)

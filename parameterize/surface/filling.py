@@ -9,7 +9,6 @@ for real-time freeform modeling", SIGGRAPH 2004). In a plane loop the patch is p
 import igl
 import numpy as np
 from scipy.sparse import coo_array, diags_array
-from scipy.sparse.linalg import splu
 
 from ..arrays import Array, IntArray, Mask
 from .geometry import directed_edges, normals_and_areas
@@ -58,6 +57,8 @@ def _plate(points: Array, faces: IntArray, fixed: int, loop: IntArray) -> Array:
     The curvature vector is that of the cotangent formula, at new vertices and at the loop; lengths and angles are those
     of the last pass, which makes the sum quadratic.
     """
+    from scipy.sparse.linalg import splu
+
     places, n = points.copy(), len(points)
     counted = np.concatenate([np.sort(loop), np.arange(fixed, n)])
     starts, ends = faces[:, [1, 2, 0]].ravel(), faces[:, [2, 0, 1]].ravel()  # opposite the corners

@@ -1,8 +1,8 @@
 """Edges, components, volume, normals, quadrics and weights of a triangle mesh."""
 
+import igl
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
+from scipy.sparse import csc_matrix
 
 from ..arrays import Array, IntArray
 
@@ -29,8 +29,9 @@ def edge_triangles(faces: IntArray) -> tuple[IntArray, IntArray]:
 
 def connected(links: IntArray, count: int) -> IntArray:
     """Return the number of the component that each of `count` things belongs to (count,), joined by links (k, 2)."""
-    graph = coo_array((np.ones(len(links)), (links[:, 0], links[:, 1])), shape=(count, count))
-    return np.asarray(connected_components(graph, directed=False)[1], dtype=np.int64)
+    rows, columns = np.concatenate([links, links[:, ::-1]]).T
+    graph = csc_matrix((np.ones(len(rows), dtype=np.int64), (rows, columns)), shape=(count, count))
+    return np.asarray(igl.connected_components(graph)[1])
 
 
 def signed_volume(vertices: Array, faces: IntArray) -> float:
