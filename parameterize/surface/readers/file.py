@@ -3,6 +3,7 @@
 import hashlib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from importlib import import_module
 from itertools import chain
 from pathlib import Path
 
@@ -13,38 +14,27 @@ from ...files import gunzip
 from ..errors import MeshError, check_face_count, check_finite, check_indices, without_unused_defects
 from ..groups import Groups, few, renumbered
 from ..triangulation import triangulate
-from .cad import read_iges, read_step
 from .common import DAMAGED, Brep, Content, Solids, SurfaceFile, most_bytes
-from .gltf import read_glb, read_gltf
-from .gmsh import read_gmsh
-from .medit import read_medit
-from .obj import read_obj
-from .off import read_off
-from .ply import read_ply
-from .stl import read_stl
-from .threemf import read_3mf
-from .vtk_legacy import read_vtk
-from .vtu import read_vtp, read_vtu
 from .zip_file import Archive, in_archive, in_folder
 
-# Each raises MeshError, without the file's name, for a bad file.
-READERS: dict[str, Callable[[SurfaceFile], Content]] = {
-    ".obj": read_obj,
-    ".stl": read_stl,
-    ".ply": read_ply,
-    ".off": read_off,
-    ".mesh": read_medit,
-    ".msh": read_gmsh,
-    ".vtu": read_vtu,
-    ".vtp": read_vtp,
-    ".vtk": read_vtk,
-    ".3mf": read_3mf,
-    ".glb": read_glb,
-    ".gltf": read_gltf,
-    ".step": read_step,
-    ".stp": read_step,
-    ".iges": read_iges,
-    ".igs": read_iges,
+# Modules and functions, loaded on use; each raises MeshError, without the file's name, for a bad file.
+READERS = {
+    ".obj": "obj.read_obj",
+    ".stl": "stl.read_stl",
+    ".ply": "ply.read_ply",
+    ".off": "off.read_off",
+    ".mesh": "medit.read_medit",
+    ".msh": "gmsh.read_gmsh",
+    ".vtu": "vtu.read_vtu",
+    ".vtp": "vtu.read_vtp",
+    ".vtk": "vtk_legacy.read_vtk",
+    ".3mf": "threemf.read_3mf",
+    ".glb": "gltf.read_glb",
+    ".gltf": "gltf.read_gltf",
+    ".step": "cad.read_step",
+    ".stp": "cad.read_step",
+    ".iges": "cad.read_iges",
+    ".igs": "cad.read_iges",
 }
 FORMATS = tuple(READERS)
 CURVED = (".step", ".stp", ".iges", ".igs")  # solid models, whose faces are curved
@@ -69,6 +59,13 @@ class RawMesh:
     brep: Brep | None = None
     conflict: str = ""
     shapes: Mapping[str, str] = field(default_factory=dict)
+
+
+def reader_of(suffix: str) -> Callable[[SurfaceFile], Content]:
+    """Return the reader of a format."""
+    module, function = READERS[suffix].split(".")
+    found: Callable[[SurfaceFile], Content] = getattr(import_module(f".{module}", __package__), function)
+    return found
 
 
 def read_mesh(path: Path, max_faces: int, deflection: float | None = None) -> RawMesh:
@@ -100,7 +97,7 @@ def read_mesh(path: Path, max_faces: int, deflection: float | None = None) -> Ra
         raise MeshError("the file is empty: export it again")
     if deflection is not None and suffix not in CURVED:
         raise MeshError(f"deflection is for {' '.join(CURVED)}, whose faces are curved: leave --deflection out")
-    content = READERS[suffix](SurfaceFile(data, max_faces, beside, deflection))
+    content = reader_of(suffix)(SurfaceFile(data, max_faces, beside, deflection))
     vertices, faces, notices, groups = triangles_of(content, max_faces)
     digest = hashlib.sha256(stored).hexdigest()
     return RawMesh(
