@@ -23,7 +23,7 @@ from ..layouts.rods.along_skeleton import LayoutError
 from ..layouts.skeleton.graph import SkeletonError
 from ..progress import timed
 from ..threads import one_blas_thread
-from ..time_limit import OutOfTime, cut_short, seconds_left
+from ..time_limit import OutOfTime, check_time, cut_short, seconds_left
 from .blocks import BLOCKS
 from .cost import Cost
 from .growth import GROWTH, LAST, STIFF
@@ -133,6 +133,7 @@ def attempts(task: MappingTask, ways: tuple[Way, ...], checkpoints: Checkpoints)
             cut_short(f"the ways to a map, before {way.name}")
             break
         try:
+            check_time()
             attempt = way.make(task, checkpoints.of_part(len(tried)) if tried else checkpoints)
         except OutOfTime:
             if not has_map:
