@@ -20,6 +20,7 @@ Numbers = tuple[Number, ...]
 Jets = Any  # an array of jets, of dtype object
 PAIRS = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))  # the order of the six second derivatives
 SYMMETRIC = ((0, 1, 2), (1, 3, 4), (2, 4, 5))  # place of a symmetric tensor's entry (i, j) among its six
+ZERO = (0.0, 0.0, 0.0)  # the gradient of a constant: this very object
 UNITS = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
@@ -49,8 +50,13 @@ class Jet:
     """
 
     value: Number
-    gradient: Numbers = (0.0, 0.0, 0.0)
+    gradient: Numbers = ZERO
     hessian: Numbers = (0.0,) * 6
+
+    @property
+    def is_constant(self) -> bool:
+        """Return whether this is a constant of a formula, whose derivatives take no arithmetic."""
+        return self.gradient is ZERO
 
     def __neg__(self) -> "Jet":
         return self * -1.0
@@ -62,12 +68,18 @@ class Jet:
 
     @_operation
     def __add__(self, b: "Jet") -> "Jet":
+        if self.is_constant or b.is_constant:
+            varying = b if self.is_constant else self
+            return Jet(_plus(self.value, b.value), varying.gradient, varying.hessian)
         gradient, hessian = _each(_plus, self.gradient, b.gradient), _each(_plus, self.hessian, b.hessian)
         return Jet(_plus(self.value, b.value), gradient, hessian)
 
     @_operation
     def __mul__(self, b: "Jet") -> "Jet":
         """Return the product: (a b)_ij = a b_ij + a_i b_j + a_j b_i + b a_ij."""
+        if self.is_constant or b.is_constant:
+            factor, varying = (self, b) if self.is_constant else (b, self)
+            return varying._scaled(factor.value)
 
         def product(da: Number, db: Number) -> Number:
             return _plus(_times(self.value, db), _times(b.value, da))
@@ -79,6 +91,13 @@ class Jet:
 
         hessian = tuple(mixed(*entries) for entries in zip(self.hessian, b.hessian, PAIRS, strict=False))
         return Jet(self.value * b.value, _each(product, self.gradient, b.gradient), hessian)
+
+    def _scaled(self, factor: Number) -> "Jet":
+        """Return the product with a constant."""
+        if self.is_constant:
+            return Jet(self.value * factor)
+        gradient = tuple(_times(factor, slope) for slope in self.gradient)
+        return Jet(self.value * factor, gradient, tuple(_times(factor, second) for second in self.hessian))
 
     def power(self, n: float) -> "Jet":
         """Return a constant power; the factors n and n (n - 1) that vanish prevent 0 ** negative."""
