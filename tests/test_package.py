@@ -102,7 +102,8 @@ def test_one_module_alone_looks_upwards():
     """`import_module` is what the linter does not see."""
     upwards = [file for name in ("parameterize", "solve") for file in (ROOT / name).rglob("*.py")]
     using = {str(file.relative_to(ROOT)) for file in upwards if "import_module(" in file.read_text(encoding="utf-8")}
-    assert using == {"parameterize/__init__.py", "parameterize/display.py"}  # the first its own modules
+    own = {"parameterize/__init__.py", "parameterize/surface/readers/file.py"}  # modules beside them
+    assert using == own | {"parameterize/display.py"}
 
 
 @pytest.fixture(scope="module")
