@@ -12,12 +12,13 @@ setup: $(RUN)
 
 setup-dev: $(DEV)
 
-# What running needs. An environment that is there is kept. The kernels are compiled ahead of the first run, which would
-# wait for them.
+# What running needs. An environment that is there is kept. Files that no run loads are removed. The kernels are compiled
+# ahead of the first run, which would wait for them.
 $(RUN): pyproject.toml constraints.txt
 	$(PYTHON) -c 'import sys; sys.exit("Python 3.11 or newer is needed, this is " + sys.version) if sys.version_info < (3, 11) else None'
 	test -x $(BIN)/python || $(PYTHON) -m venv .venv
 	$(INSTALL) -e .
+	$(BIN)/python -P .ci/trim.py
 	$(BIN)/python -P -m iga_nn.compile_kernels
 	touch $@
 

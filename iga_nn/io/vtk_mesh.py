@@ -129,11 +129,10 @@ def _grids(path: Path) -> Iterator[Grid]:
 
 
 def _cell_types(grid: Any) -> Any:
-    """Return the types of a grid's cells; VTK 9.6 has another name for them."""
-    from vtkmodules.util.numpy_support import vtk_to_numpy
+    """Return the types of a grid's cells; PyVista knows by which name each release of VTK has them."""
+    from pyvista import UnstructuredGrid
 
-    types = grid.GetCellTypes()
-    return vtk_to_numpy(grid.GetCellTypesArray() if types is None else types)
+    return UnstructuredGrid(grid).celltypes
 
 
 def _read(path: Path) -> Any:

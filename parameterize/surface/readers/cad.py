@@ -40,7 +40,8 @@ SAID = {
     "healed": "OpenCASCADE found a fault in the solid and healed it",
     "invalid": "OpenCASCADE finds a fault in the solid and cannot heal it: compare its volume",
 }
-PLURALS = {"other entity": "other entities", "surface without an outline": "surfaces without an outline"}
+OTHER = "other entity"  # of which nothing is known; OpenCASCADE counts what holds nothing but a curve, too
+PLURALS = {OTHER: "other entities", "surface without an outline": "surfaces without an outline"}
 # Of whose items shapes are made.
 SHAPES = re.compile(
     rb"\b(?:\w*SHAPE_REPRESENTATION|CONSTRUCTIVE_GEOMETRY_REPRESENTATION)\s*\(\s*(?:'[^']{0,400}+')+\s*,\s*\(([^()]*+)\)"
@@ -148,7 +149,8 @@ def _check(facts: Mapping[str, Any], count: int, left_out: Counter[str]) -> None
         named = ", ".join(f"face{number}" for number in missing[:LISTED]) + ", ..." * (len(missing) > LISTED)
         raise MeshError(f"OpenCASCADE cannot divide {named} into triangles: repair it, or export triangles instead")
     if not count:
-        there = f", only {_counted(left_out)}" if left_out else ""
+        known = Counter({what: number for what, number in left_out.items() if what != OTHER}) or left_out
+        there = f", only {_counted(known)}" if known else ""
         raise MeshError(f"has no solid and no faces that bound a body{there}: export the solid")
     if facts["size"] < SMALLEST:
         raise MeshError(
