@@ -3,7 +3,8 @@ PYTHON ?= python3
 BIN := .venv/bin
 RUN := .venv/.run
 DEV := .venv/.dev
-# Python compiles the modules that it loads: --no-compile, as most are never loaded.
+# pip leaves out the bytecode, as most modules are never loaded; Python keeps that of those it loads, whoever forbids it.
+unexport PYTHONDONTWRITEBYTECODE
 INSTALL := $(BIN)/python -m pip install --no-compile -c constraints.txt
 
 .PHONY: setup setup-dev demo docs test suite lint validate stress fuzz audit disturbed
@@ -19,6 +20,7 @@ $(RUN): pyproject.toml constraints.txt
 	test -x $(BIN)/python || $(PYTHON) -m venv .venv
 	$(INSTALL) -e .
 	$(BIN)/python -P .ci/trim.py
+	$(BIN)/python -P -c 'import iga_nn.cli.commands, jinja2, matplotlib.pyplot, pyvista.plotting, trimesh'
 	$(BIN)/python -P -m iga_nn.compile_kernels
 	touch $@
 
