@@ -7,7 +7,6 @@ from itertools import pairwise, product
 from typing import Any
 
 import numpy as np
-from scipy.optimize import brentq
 from scipy.special import zeta
 
 from parameterize.arrays import Array, IntArray
@@ -151,6 +150,8 @@ def lowest_waves(
 
 @lru_cache(maxsize=64)  # thousands of patches have few numbers
 def _slowest(low: float, high: float) -> float:
+    from scipy.optimize import brentq  # of all runs, those that estimate an error alone need it
+
     b = np.array([low, high])
     return float(brentq(lambda k: k - np.arctan2(b, k).sum(), 0.0, np.pi)) if b.any() else 0.0
 
