@@ -11,6 +11,7 @@ _STEP = 4  # samples of a side, of which the patch is looked at
 _SWEEPS = 12  # over all inner points
 _STEPS = (0.3, 0.1, 0.03)  # of the shortest side there: how far a point is moved
 _WAYS = np.array([[np.cos(a), np.sin(a)] for a in np.arange(8) * np.pi / 4.0])
+_ENDS = np.array([[0, 1], [3, 2], [0, 3], [1, 2]])  # of the sides v = 0, v = 1, u = 0 and u = 1 among four corners
 
 Quad = tuple[int, ...]
 Sides = dict[tuple[int, int], Curve]
@@ -34,13 +35,13 @@ def qualities(points: Array, quads: Sequence[Quad], sides: Sides) -> Array:
     """
     if not len(quads):
         return np.zeros(0)
-    even = np.linspace(0.0, 1.0, SAMPLES)[:, None]
-
-    def side(a: int, b: int) -> Array:
-        curve = sides.get((a, b))
-        return curve.samples if curve is not None else (1.0 - even) * points[a] + even * points[b]
-
-    rows = np.array([[side(a, b), side(d, c), side(a, d), side(b, c)] for a, b, c, d in quads])
+    ends = np.asarray(quads)[:, _ENDS]  # (k, 4, 2)
+    even, starts, stops = np.linspace(0.0, 1.0, SAMPLES)[:, None], points[ends[..., :1]], points[ends[..., 1:]]
+    rows = (1.0 - even) * starts + even * stops  # (k, 4, SAMPLES, 2)
+    of_sides = rows.reshape(-1, SAMPLES, 2)
+    for number, (a, b) in enumerate(ends.reshape(-1, 2).tolist()):
+        if (curve := sides.get((a, b))) is not None:
+            of_sides[number] = curve.samples
     return qualities_of(rows)
 
 
