@@ -4,6 +4,7 @@ References to texture coordinates and normals are dropped: at a seam they would 
 objects name the faces after them. Records that are no part of the surface, such as lines, are left out with a notice.
 """
 
+import re
 from array import array
 from collections import Counter
 from collections.abc import Iterator
@@ -12,7 +13,7 @@ import numpy as np
 
 from ..errors import MeshError
 from ..groups import Groups, gathered
-from .common import Content, SurfaceFile, coordinates, corners, text_lines
+from .common import NUMBER, Content, SurfaceFile, coordinates, corners, text_lines
 
 FACES = ("f", "fo")
 PATCHES = ("surf", "bsp", "bzp", "call")  # free-form surfaces, and other files
@@ -21,19 +22,23 @@ NAMING = ("g", "usemtl", "o")  # the faces that follow, until the next of the sa
 SKIPPED = {"vt", "vn", "vp", "s", "mg", "mtllib", "usemap", "maplib", "bevel", "lod", "shadow_obj"}
 SKIPPED |= {"trace_obj", "c_interp", "d_interp", "ctech", "stech", "cstype", "deg", "bmat", "step", "parm", "end"}
 LISTED = 5  # kinds of records left out
+PLAIN = re.compile(rf"(?:(?:#.*|v(?: (?i:{NUMBER})){{3}}|f(?: [1-9]\d{{0,17}}){{3}})?\n)*+", re.ASCII)
 
 
 def read_obj(file: SurfaceFile) -> Content:
     """Read the records `v x y z` and `f a b c ...`; negative vertex numbers count back from the last vertex so far."""
     if b"\0" in file.data:
         raise MeshError("not an OBJ: it holds binary data; export as OBJ text")
+    lines = text_lines(file.data)
+    if (plain := _plain(lines)) is not None:
+        return plain
     places = array("d")
     polygons: list[list[int]] = []
     named: list[tuple[int, list[str]]] = []
     relative = False
     highest, highest_line = 0, 0
     left_out: Counter[str] = Counter()
-    for line, words in _records(text_lines(file.data)):
+    for line, words in _records(lines):
         if words[:1] == ["v"]:
             places.extend(coordinates(words[1:], line))
         elif words and words[0] in FACES:
@@ -66,6 +71,18 @@ def read_obj(file: SurfaceFile) -> Content:
         more = f" and {len(left_out) - LISTED} more kinds" if len(left_out) > LISTED else ""
         notices.append(f"left out records that are no vertices or faces: {listed}{more}")
     return Content(vertices, polygons, tuple(notices), _groups(named, len(polygons)))
+
+
+def _plain(lines: list[str]) -> Content | None:
+    """Return the content of a file of vertices and triangles alone, read at once; None for any other one."""
+    if not PLAIN.fullmatch("\n".join([*lines, ""])):
+        return None
+    places, numbers = (" ".join([line[2:] for line in lines if line[:1] == kind]) for kind in "vf")
+    vertices = np.array(places.split(), dtype=np.float64).reshape(-1, 3)
+    faces = np.array(numbers.split(), dtype=np.int64).reshape(-1, 3) - 1
+    if not len(vertices) or not len(faces) or faces.max() >= len(vertices):
+        return None
+    return Content(vertices, faces.tolist())
 
 
 def _groups(named: list[tuple[int, list[str]]], count: int) -> Groups:
