@@ -62,6 +62,21 @@ def test_gradients_of_all_terms_against_finite_differences(name):
             assert found == pytest.approx(difference(term, control, direction), rel=2e-4), type(term).__name__
 
 
+def test_the_diagonal_of_every_second_derivative_is_that_of_its_products():
+    energy, control = started("four blocks around an edge")
+    like, chosen = control.astype(np.float32), np.random.default_rng(0).choice(control.shape[1], 12, replace=False)
+    rows, columns = np.tril_indices(3)
+    for term in (*energy.inner, *energy.outer):
+        operator = term.curvature(control)
+        blocks = operator.diagonal(like)
+        assert blocks.shape == (6, control.shape[1])
+        for point in chosen:
+            units = np.zeros((3, *like.shape), np.float32)
+            units[np.arange(3), np.arange(3), point] = 1.0
+            expected = np.stack([operator(unit)[:, point] for unit in units])[rows, columns]
+            assert blocks[:, point] == pytest.approx(expected, rel=2e-4, abs=2e-5 * float(np.abs(blocks).max()))
+
+
 @pytest.mark.parametrize("name", BODIES)
 def test_the_gradient_of_the_energy_is_that_of_moves_without_a_gap(name):
     energy, control = started(name)

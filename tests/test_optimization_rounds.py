@@ -146,7 +146,7 @@ def test_an_easy_shape_ends_certified_with_less_distortion():
     first = columns["loss"][: CONFIG.steps]
     assert set(columns["stage"]) == {"spline"} and (np.diff(first) < 0.0).all()
     assert course.ending is Reason.POLISHED
-    assert set(course.rounds) == set(course.seconds) == {"shape", "polish"}
+    assert set(course.rounds) == set(course.seconds) >= {"shape", "polish"}
 
 
 def test_a_folded_start_is_unfolded():

@@ -72,6 +72,15 @@ def test_no_slide_leads_away():
     assert_on_the_cube(places)
 
 
+def test_no_slide_leads_to_a_place_that_faces_away():
+    start, face, goal = np.array([[1.0, 0.5, 0.99]]), np.array([1]), np.array([[0.99, 0.5, 1.02]])
+    for normals, expected in ((None, 5), (np.array([[1.0, 0.0, 1.0]]), 5), (np.array([[1.0, 0.0, -1.0]]), 1)):
+        places = parameters_at(start)
+        places.place(start, face)
+        places.slide(wavy_control(0.0), goal, normals)
+        assert places.cube_faces.tolist() == [expected] and (expected == 5 or np.array_equal(places.parameters, start))
+
+
 def test_a_slide_that_keeps_the_layout_turns_no_triangle():
     start, triangles = rounded_cube(300, power=40.0)
     start = snap(start)

@@ -4,7 +4,9 @@ operators.py explains the layout of control points and the sum of pieces of work
 """
 
 import math
+from collections.abc import Callable
 from functools import partial
+from typing import Any
 
 import numba
 import numpy as np
@@ -48,7 +50,18 @@ def bending_operator(matrices: Grams, weight: float, dtype: DTypeLike = np.float
     def bend(component: int, control: Floats) -> Floats:
         return np.asarray(_bent(bands, control[component]))
 
-    return PiecewiseOperator([partial(bend, component) for component in range(3)], lambda parts, _: np.stack(parts))
+    (m_u, k_u, h_u), (m_v, k_v, h_v), (m_w, k_w, h_w) = ([np.diag(part[d]) for part in matrices] for d in range(3))
+    own = _outer(h_u, m_v, m_w) + _outer(m_u, h_v, m_w) + _outer(m_u, m_v, h_w)
+    own += 2.0 * (_outer(k_u, k_v, m_w) + _outer(k_u, m_v, k_w) + _outer(m_u, k_v, k_w))
+    blocks = np.zeros((6, *own.shape), dtype)
+    blocks[[0, 2, 5]] = weight * own  # of the three components
+    pieces: list[Callable[[Floats], Any]] = [partial(bend, component) for component in range(3)]
+    return PiecewiseOperator(pieces, lambda parts, _: np.stack(parts), lambda _: blocks)
+
+
+def _outer(u: Array, v: Array, w: Array) -> Array:
+    """Return the products (n_u, n_v, n_w) of entries of three rows."""
+    return u[:, None, None] * v[:, None] * w
 
 
 class BlockFairness:

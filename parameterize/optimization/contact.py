@@ -66,7 +66,12 @@ class ContactPenalty:
         def product(x: Floats) -> Floats:
             return single._pull(scale * single.distances(x), x)
 
-        return PiecewiseOperator([product], lambda parts, _: parts[0])
+        metric = scale[:, None, None] * single.normals[:, :, None] * single.normals[:, None, :]
+        return PiecewiseOperator(
+            [product],
+            lambda parts, _: parts[0],
+            lambda like: first.diagonal(metric, like) + second.diagonal(metric, like),
+        )
 
     def distances(self, control: Floats) -> Floats:
         """Return the distances (F(p) - F(q)) . n, (k,); a distance is negative where p lies behind the sheet of q."""

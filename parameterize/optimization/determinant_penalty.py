@@ -9,7 +9,7 @@ derivative is computed from the product of the other two: one row of 3 (p + 1)^3
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 import numba
 import numpy as np
@@ -19,13 +19,16 @@ from ..spline.bernstein import add_products, binomials, cross_products, extracti
 from ..spline.bspline import breakpoints
 from ..spline.spline_map import ControlNets
 from ..threads import in_parallel
-from .operators import PiecewiseOperator
+from .operators import PiecewiseOperator, no_blocks
 from .spans import numbers, with_neighbours
 from .term import Blockwise, RoundWeights
 
 MIN_COEFFICIENT = 0.1  # a Bernstein coefficient of det J below this is penalised on active spans; mean det J is 1
 _BLOCK = 32  # spans at a time: their arrays fit into the cache
 _MOST_KEPT = 300e6  # bytes of rows that are kept from product to product; those of further spans are made anew
+
+
+_Windows = tuple[IntArray, Floats]  # first control points (k, 3), and values (k, ...) of the points from each on
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,6 +65,20 @@ class _Rows:
     shares: Array
     rows: Array
     starts: IntArray
+
+    def in_control_points(self) -> "_Rows":
+        """Return the derivatives in the control points that act on each span, in place of its Bezier points."""
+        n = self.rows.shape[2]
+        u, v, w = np.moveaxis(self.spans.weights, 1, 0)
+        to_bezier = np.einsum("sai,sbj,sck->sabcijk", u, v, w).reshape(-1, n**3, n**3).astype(self.rows.dtype)
+        rows = np.empty_like(self.rows)
+        for matrix, begin, end in zip(to_bezier, self.starts, self.starts[1:], strict=False):
+            rows[begin:end] = (self.rows[begin:end].reshape(-1, n**3) @ matrix).reshape(rows[begin:end].shape)
+        return replace(self, rows=rows)
+
+    def squared(self, x: Floats) -> _Windows:
+        """Return the windows of `in_control_points`: the transposed rows times their shares, times the rows of x."""
+        return self.spans.first, _squared(x, self.spans.first, self.rows, self.starts, 2.0 * self.shares)
 
 
 class BlockDeterminants:
@@ -122,17 +139,22 @@ class BlockDeterminants:
         """
         taken = 0.0
 
-        def piece(spans: _PenaltySpans) -> Callable[[Floats], tuple[IntArray, Floats]] | None:
+        def piece(spans: _PenaltySpans) -> tuple[Callable[[Floats], _Windows], _Windows] | None:
             nonlocal taken
-            found = self._short_rows(control, spans, np.float32)
+            found = self._short_rows(control, spans, np.float32).in_control_points()
             if not len(found.rows):
                 return None
+            own = found.spans.first, _blocks(found.rows, found.starts, 2.0 * found.shares)
             taken += found.rows.nbytes
             if taken <= _MOST_KEPT:
-                return lambda x: _product(found, x)
-            return lambda x: _product(self._short_rows(control, spans, np.float32), x)
+                return found.squared, own
+            return lambda x: self._short_rows(control, spans, np.float32).in_control_points().squared(x), own
 
-        return PiecewiseOperator([one for one in in_parallel(piece, self._pieces) if one is not None], _collected)
+        found = [one for one in in_parallel(piece, self._pieces) if one is not None]
+        blocks = [own for _, own in found]
+        return PiecewiseOperator(
+            [product for product, _ in found], _collected, lambda like: _collected(blocks, no_blocks(like))
+        )
 
     def _short_rows(self, control: Array, spans: _PenaltySpans, dtype: type[np.floating] = np.float64) -> _Rows:
         """Return the rows of the coefficients that lie below the floor on some spans."""
@@ -199,16 +221,8 @@ class DeterminantPenalty(Blockwise[BlockDeterminants]):
             term.weigh(weights[own].reshape(spans), self._lowered[own].reshape(spans))
 
 
-def _product(found: _Rows, x: Floats) -> tuple[IntArray, Floats]:
-    """Return the first control points of some spans' windows, and the single-precision rows times x there."""
-    spans = found.spans
-    weights, back = spans.weights.astype(np.float32), spans.back.astype(np.float32)
-    pushed = _squared(x, spans.first, weights, back, found.rows, found.starts, 2.0 * found.shares)
-    return spans.first, pushed
-
-
-def _collected(parts: list[tuple[IntArray, Floats]], like: Floats) -> Floats:
-    """Add windows (k, 3, p + 1, p + 1, p + 1) of control points in order; each starts at its first point (k, 3)."""
+def _collected(parts: list[_Windows], like: Floats) -> Floats:
+    """Add windows (k, ..., p + 1, p + 1, p + 1) of control points in order; each starts at its first point (k, 3)."""
     total = np.zeros_like(like)
     for first, windows in parts:
         _add_windows(windows, first, total)
@@ -310,20 +324,50 @@ def _combine(rows: Array, starts: IntArray, factors: Array, back: Array) -> Arra
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def _squared(
-    control: Array, first: IntArray, weights: Array, back: Array, rows: Array, starts: IntArray, shares: Array
-) -> Array:
-    """Return control points times each span's rows, their shares (r,) and the transposed rows, as in `_combine`."""
-    changes = _changes(rows, starts, _bezier_points(control, first, weights))
-    return _combine(rows, starts, shares * changes, back)
+def _squared(control: Array, first: IntArray, rows: Array, starts: IntArray, shares: Array) -> Array:
+    """Return control points times each span's rows, their shares (r,) and the transposed rows, as windows.
+
+    rows: the derivatives in control points.
+    """
+    spans, n = len(first), rows.shape[2]
+    points = np.empty((spans, 3, n, n, n), rows.dtype)
+    for s in range(spans):
+        u, v, w = first[s]
+        for c in range(3):
+            for i in range(n):
+                for j in range(n):
+                    for k in range(n):
+                        points[s, c, i, j, k] = control[c, u + i, v + j, w + k]
+    factors = shares * _changes(rows, starts, points)
+    flat, windows = rows.reshape(len(rows), 3 * n**3), np.zeros((spans, 3 * n**3), rows.dtype)
+    for s in range(spans):
+        for r in range(starts[s], starts[s + 1]):
+            for i in range(3 * n**3):
+                windows[s, i] += factors[r] * flat[r, i]
+    return windows.reshape(spans, 3, n, n, n)
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _blocks(rows: Array, starts: IntArray, shares: Array) -> Array:
+    """Return the blocks on the diagonal of `_squared`, as windows (k, 6, n, n, n)."""
+    n = rows.shape[2]
+    flat, windows = rows.reshape(len(rows), 3, n**3), np.zeros((len(starts) - 1, 6, n**3), rows.dtype)
+    for s in range(len(windows)):
+        for r in range(starts[s], starts[s + 1]):
+            for c in range(3):
+                for other in range(c + 1):
+                    entry = c * (c + 1) // 2 + other
+                    for i in range(n**3):
+                        windows[s, entry, i] += shares[r] * flat[r, c, i] * flat[r, other, i]
+    return windows.reshape(len(windows), 6, n, n, n)
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def _add_windows(windows: Array, first: IntArray, total: Array) -> None:
-    """Add windows (k, 3, n, n, n) to control points (3, n_u, n_v, n_w); each starts at its first control point."""
+    """Add windows (k, m, n, n, n) to control points (m, n_u, n_v, n_w); each starts at its first control point."""
     n = windows.shape[2]
     for s in range(len(first)):
-        for c in range(3):
+        for c in range(windows.shape[1]):
             for i in range(n):
                 for j in range(n):
                     for k in range(n):

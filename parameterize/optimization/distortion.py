@@ -11,7 +11,7 @@ from ..arrays import Array, Floats, Knots
 from ..quality.rotations import closest_rotations, cofactors_and_determinants, least_eigenvalues, squared_norms
 from ..spline.spline_map import ControlNets
 from ..threads import in_parallel
-from .operators import PiecewiseOperator
+from .operators import PiecewiseOperator, no_blocks
 from .tensor_product import SYMMETRIC, GaussGrid
 from .term import Blockwise, RoundWeights
 
@@ -109,7 +109,7 @@ class BlockDistortion:
         """
         rough = control.astype(np.float32)
 
-        def piece(planes: slice) -> Callable[[Floats], tuple[int, Floats]]:
+        def piece(planes: slice) -> tuple[Callable[[Floats], tuple[int, Floats]], tuple[int, Floats]]:
             jacobian, weights = self._grid.jacobian(rough, planes), self._weights(planes).astype(np.float32)
             rotation = closest_rotations(jacobian)
             cofactors, det = cofactors_and_determinants(jacobian)
@@ -123,9 +123,12 @@ class BlockDistortion:
             inverse = squared_norms(cofactors) / (3.0 * np.maximum(det, _LEAST_DET) ** 2)
             held = 2.0 * self.damping * weights * np.clip(inverse, 1.0, 1.0 / _LEAST_DET**2)
             parts = rotation, _turning(rotation, jacobian), pull.reshape(9, -1), push.reshape(9, -1), scale, held
-            return self._grid.squared(_matrices(*parts), planes)
+            matrices = _matrices(*parts)
+            return self._grid.squared(matrices, planes), self._grid.diagonal(matrices, planes)
 
-        return PiecewiseOperator(in_parallel(piece, self._grid.planes()), self._grid.collect)
+        products, diagonals = zip(*in_parallel(piece, self._grid.planes()), strict=True)
+        blocks = self._grid.collect(list(diagonals), no_blocks(rough))
+        return PiecewiseOperator(list(products), self._grid.collect, lambda _: blocks)
 
     def _weights(self, planes: slice) -> Array:
         return self._grid.weights[planes].ravel()

@@ -5,11 +5,11 @@ J; local-global methods hold the rotations fixed, which makes slides along the s
 matrix for the penalties. The boundary term is quadratic for fixed parameters.
 """
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 
 import numpy as np
 
-from ..arrays import Array, Floats, IntArray
+from ..arrays import Array, IntArray
 from ..conjugate_gradients import conjugate_gradients
 from ..quality.distortion import own_boxes
 from ..spline.spline_map import ControlNets, SplineMap
@@ -20,16 +20,16 @@ from .determinant_penalty import DeterminantPenalty
 from .distortion import DistortionTerm
 from .normals import AlignmentPenalty, alignment_penalty
 from .operators import weighted_sum
+from .preconditioner import Preconditioner
 from .reassignment import faces_towards, reassign
 from .spans import acting_on, with_neighbours
 from .surface_distance import Correspondence
-from .tensor_product import KroneckerInverse
 from .term import RoundWeights, Term, Weights
 
 _REACH = 0.03  # while F grows, surface points farther from F than this do not slide, and draw F in all directions
 _RELAXATIONS = 1  # sweeps over the triangles that these flipped: after every step, so that flips do not pile up
-_PULL = 3e-4  # share of the surface's weight in the preconditioner: more would hold back slides along the surface
-_TOLERANCE, _ITERATIONS = 0.1, 20  # of a Newton direction, relative and at most: a better one does not save steps
+_TOLERANCE, _ITERATIONS = 0.1, 7  # of a Newton direction, relative and at most: a better one does not save steps
+_ITERATIONS_OF_BLOCKS = 20  # at most, without the scaled preconditioner
 _SMOOTH_TOLERANCE, _SMOOTH_ITERATIONS = 1e-8, 5000  # of `smoothed`, whose result is a map and no direction
 
 
@@ -62,7 +62,7 @@ class SplineEnergy:
         self.determinants = DeterminantPenalty(nets, knots)
         self.determinants.weigh(span_weights)
         self.inner: tuple[Term, ...] = (self.distortion, self.fairness, self.determinants)
-        self._precondition = self._preconditioner()
+        self._precondition = Preconditioner(nets, self.fairness, self._round.surface)
 
     @property
     def outer(self) -> tuple[Term, ...]:
@@ -71,25 +71,6 @@ class SplineEnergy:
             return (self._approach,)
         terms: tuple[Term | None, ...] = (self.surface, self.anchors, self._contact, self._alignment)
         return tuple(term for term in terms if term is not None)
-
-    def _preconditioner(self) -> Callable[[Floats], Floats]:
-        """Return the inverse of the second derivative at the identity, the surface's data spread over six faces.
-
-        Each block has its own inverse; the results are averaged at interfaces.
-        """
-        parts = []
-        for fairness in self.fairness.terms:
-            rough = fairness.with_stiffness()
-            for matrix in rough:
-                matrix[[0, -1], [0, -1]] += _PULL * self._round.surface / 6.0
-            parts.append(KroneckerInverse(rough, fairness.mass, dtype=np.float32))
-        nets = self.nets
-
-        def apply(residual: Floats) -> Floats:
-            found = [part(nets.of_block(residual, block)) for block, part in enumerate(parts)]
-            return nets.merged(nets.joined(found))
-
-        return apply
 
     def start_round(
         self, control: Array, penalty: float, share: float | None = None, *, by_faces: bool = False
@@ -110,7 +91,7 @@ class SplineEnergy:
         if not self.nets.is_single or (share is None and not self._grows):
             return
         self._grows = share is not None
-        self._precondition = self._preconditioner()
+        self._precondition = Preconditioner(self.nets, self.fairness, self._round.surface)
         reach = _REACH if self._grows else np.inf
         self.surface.hold(np.linalg.norm(self.surface.residuals(control), axis=1) > reach)
 
@@ -133,11 +114,12 @@ class SplineEnergy:
         """Let the surface's parameters slide towards their closest points, and penalise wrong normals of F there."""
         if self._approach is not None:
             return
-        sliding, points = self.surface.sliding, self.surface.points
+        sliding = self.surface.sliding
+        goals = self.surface.points, self.surface.normals if self.nets.is_single else None
         if self._grows:
-            sliding.slide(control, points, keep_layout=True, reach=_REACH)
+            sliding.slide(control, *goals, keep_layout=True, reach=_REACH)
         else:
-            sliding.slide(control, points)
+            sliding.slide(control, *goals)
             sliding.relax(_RELAXATIONS)
         self.watch_alignment(control)
         if self._contact is not None:
@@ -196,12 +178,14 @@ class SplineEnergy:
         """Return an approximate solution of (Hessian + damping) x = right at `control`, with fixed parameters."""
         self.distortion.damp(damping)
         terms = [(term.weight(self._round), term.curvature(control)) for term in (*self.inner, *self.outer)]
-        operator = weighted_sum(terms)
+        operator, residual = weighted_sum(terms), right.astype(np.float32)
+        if self.nets.is_single:
+            self._precondition.scale(operator.diagonal(residual))
         direction = conjugate_gradients(
             lambda x: self.nets.merged(operator(x)),
-            right.astype(np.float32),
+            residual,
             self._precondition,
             tolerance=_TOLERANCE,
-            max_iterations=_ITERATIONS,
+            max_iterations=_ITERATIONS if self.nets.is_single else _ITERATIONS_OF_BLOCKS,
         ).x
         return np.asarray(direction, dtype=np.float64)

@@ -14,7 +14,7 @@ import numpy as np
 from ..arrays import Array, Floats
 from ..cube.cube import axis_and_side
 from ..quality.rotations import dots
-from .operators import ControlRows, PiecewiseOperator
+from .operators import ControlRows, PiecewiseOperator, no_blocks
 from .surface_distance import Correspondence
 from .term import RoundWeights
 
@@ -58,7 +58,16 @@ class AlignmentPenalty:
             a, b = (rows(x).T for rows in single.tangents)
             return single._pull(scale * (dots(by_a, a) + dots(by_b, b)), by_a, by_b, x)
 
-        return PiecewiseOperator([product], lambda parts, _: parts[0])
+        def diagonal(like: Floats) -> Floats:
+            total = no_blocks(like)
+            slopes = ((along_a, by_a), (along_b, by_b))
+            for rows, slope in slopes:
+                for others, other in slopes:
+                    metric = scale[:, None, None] * slope.T[:, :, None] * other.T[:, None, :]
+                    total += rows.diagonal(metric, like, others)
+            return total
+
+        return PiecewiseOperator([product], lambda parts, _: parts[0], diagonal)
 
     def _slopes(self, control: Floats) -> tuple[Floats, Floats, Floats]:
         """Return the derivatives of (t_a x t_b) . n in t_a and in t_b, (3, k) each, and then its values, (k,)."""

@@ -2,6 +2,9 @@
 
 Control points have the shape (3, n), component first. The pieces of work run on all threads; their results
 are added in the order of the pieces, so that every number of threads gives the same bits.
+
+A preconditioner needs the 3 x 3 blocks on the diagonal of a symmetric operator, one for each control point. They have
+the shape (6, n): the entries of their lower triangles, row by row.
 """
 
 from collections.abc import Callable
@@ -21,10 +24,14 @@ _ROWS = 4096  # in a piece of work
 
 @dataclass(frozen=True, eq=False)
 class PiecewiseOperator:
-    """Map x to the sum of the results of all pieces of work; `add` receives these results in order, and x."""
+    """Map x to the sum of the results of all pieces of work; `add` receives these results in order, and x.
+
+    diagonal: returns the blocks on the diagonal, (6, ...), for control points (3, ...) like the given ones.
+    """
 
     pieces: list[Callable[[Floats], Any]]
     add: Callable[[list[Any], Floats], Floats]
+    diagonal: Callable[[Floats], Floats]
 
     def __call__(self, x: Floats) -> Floats:
         """Return the operator applied to control points (3, n), in the same shape."""
@@ -45,7 +52,15 @@ def weighted_sum(terms: list[tuple[float, PiecewiseOperator]]) -> PiecewiseOpera
             total += weight * operator.add(list(islice(rest, len(operator.pieces))), x)
         return total
 
-    return PiecewiseOperator([piece for _, operator in terms for piece in operator.pieces], add)
+    def diagonal(like: Floats) -> Floats:
+        return sum((weight * operator.diagonal(like) for weight, operator in terms), start=no_blocks(like))
+
+    return PiecewiseOperator([piece for _, operator in terms for piece in operator.pieces], add, diagonal)
+
+
+def no_blocks(like: Floats) -> Floats:
+    """Return blocks on a diagonal (6, ...) that are zero, for control points (3, ...)."""
+    return np.zeros((6, *like.shape[1:]), like.dtype)
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,7 +95,20 @@ class ControlRows:
         def product(rows: slice, field: Floats) -> Floats:
             return np.asarray(_squared(self.columns[rows], self.values[rows], metric[rows], field.reshape(3, -1)))
 
-        return PiecewiseOperator([partial(product, rows) for rows in pieces(len(self.values))], _summed)
+        return PiecewiseOperator(
+            [partial(product, rows) for rows in pieces(len(self.values))],
+            _summed,
+            lambda like: self.diagonal(metric, like),
+        )
+
+    def diagonal(self, metric: Floats, like: Floats, other: "ControlRows | None" = None) -> Floats:
+        """Return the blocks on the diagonal of R^T M S, (6, ...), with other rows S of the same columns, or R itself.
+
+        metric: the matrices M (N, 3, 3), of which the symmetric parts count.
+        """
+        out = no_blocks(like)
+        _add_blocks(self.columns, self.values * (other or self).values, metric, out.reshape(6, -1))
+        return out
 
 
 def _summed(parts: list[Floats], like: Floats) -> Floats:
@@ -110,6 +138,25 @@ def _spread(columns: IntArray, values: Floats, dual: Floats, count: int) -> Floa
             for c in range(3):
                 out[c, column] += value * dual[row, c]
     return out
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _add_blocks(columns: IntArray, factors: Floats, metric: Floats, out: Floats) -> None:
+    """Add metrics (m, 3, 3) times their factors (m, k) to the blocks (6, n) of the columns (m, k)."""
+    half = out.dtype.type(0.5)
+    for row in range(len(columns)):
+        m = metric[row]
+        entries = (
+            m[0, 0],
+            half * (m[1, 0] + m[0, 1]),
+            m[1, 1],
+            half * (m[2, 0] + m[0, 2]),
+            half * (m[2, 1] + m[1, 2]),
+            m[2, 2],
+        )
+        for place in range(columns.shape[1]):
+            for e in range(6):
+                out[e, columns[row, place]] += factors[row, place] * entries[e]
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]

@@ -114,23 +114,33 @@ class SlidingParameters:
         """Return the mask (N,) of the points with parameters in one of the spans (k, 4) or next to it."""
         return with_neighbours(spans, self.nets)[numbers(self.spans(), self.nets)]
 
-    def slide(self, control: Array, points: Array, *, keep_layout: bool = False, reach: float = np.inf) -> None:
+    def slide(
+        self,
+        control: Array,
+        points: Array,
+        normals: Array | None = None,
+        *,
+        keep_layout: bool = False,
+        reach: float = np.inf,
+    ) -> None:
         """Move every parameter by one Gauss-Newton step to the place where F's boundary is closest to its point (N, 3).
 
         A step across an edge continues on the next face of the boundary; the longest step in the parameters is half of
         the inverse of the block's number of control points in its longest direction.
-        Points whose distance would grow, and points farther away than `reach`, keep their parameters. With
-        `keep_layout`, steps that would flip a triangle are shortened.
+        Points whose distance would grow, and points farther away than `reach`, keep their parameters. So do points with
+        outward normals (N, 3) that would come to a place where F's boundary faces the other way: a few of them would
+        fold F there. With `keep_layout`, steps that would flip a triangle are shortened.
         """
         window, field = self.window, np.ascontiguousarray(control.reshape(3, -1))
         polynomials, before = self._polynomials, self.on_faces
         longest = np.array([0.5 / max(shape) for shape in self.nets.shapes])
         edges = next_faces(self.nets), self.boxes
+        outward = np.zeros_like(points) if normals is None else normals
 
         def part(rows: slice) -> tuple[Array, ...]:
             known = (window.indices[rows], window.in_a[rows], window.in_b[rows])
             at = (self.parameters[rows], self.cube_faces[rows], self.fixed[rows])
-            return _slid(polynomials, edges, *at, *known, field, points[rows], longest, reach)
+            return _slid(polynomials, edges, *at, *known, field, points[rows], outward[rows], longest, reach)
 
         found = in_parallel(part, pieces(len(points)))
         goal, parameters, cube_faces, *arrays = (np.concatenate(parts) for parts in zip(*found, strict=True))
@@ -220,6 +230,7 @@ def _slid(
     in_b: Array,
     control: Array,
     points: Array,
+    normals: Array,
     max_steps: Array,
     reach: float,
 ) -> tuple[Array, Array, IntArray, IntArray, Array, Array]:
@@ -240,6 +251,7 @@ def _slid(
             square += off * off
             aa, bb, ab = aa + along_a * along_a, bb + along_b * along_b, ab + along_a * along_b
             ra, rb = ra + along_a * off, rb + along_b * off
+        agreed = _agreement(found[n], normals[n], cube_faces[n])
         step_a, step_b = damped_solution(aa, bb, ab, ra, rb, _DAMPING)
         face = cube_faces[n]
         free_a, free_b = not fixed[n, (face % 6 // 2 + 1) % 3], not fixed[n, (face % 6 // 2 + 2) % 3]
@@ -258,13 +270,23 @@ def _slid(
         after = 0.0
         for c in range(3):
             after += (found[n, 0, c] - points[n, c]) ** 2
-        if after > square:
+        if after > square or _agreement(found[n], normals[n], cube_faces[n]) < min(agreed, 0.0):
             cube_faces[n] = face
             write(before[n], parameters[n])
             write(old[n], indices[n])
             write(old_a[n], in_a[n])
             write(old_b[n], in_b[n])
     return goal, parameters, cube_faces, indices, in_a, in_b
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _agreement(found: Array, normal: Array, face: int) -> float:
+    """Return (t_a x t_b) . n with F and its tangents, the rows of `found`, and the outward normal n of a point."""
+    a, b = found[1], found[2]
+    size = (a[1] * b[2] - a[2] * b[1]) * normal[0]
+    size += (a[2] * b[0] - a[0] * b[2]) * normal[1]
+    size += (a[0] * b[1] - a[1] * b[0]) * normal[2]
+    return size if face % 2 == 1 else -size
 
 
 def fold_over_edges(

@@ -93,6 +93,12 @@ class GaussGrid:
         forward, (layer, backward) = self._forward(planes, matrices.dtype), self._backward(planes, matrices.dtype)
         return lambda control: (layer, _squared_jacobian(forward, backward, matrices, control))
 
+    def diagonal(self, matrices: Floats, planes: slice) -> tuple[int, Floats]:
+        """Return the blocks on the diagonal of `squared`, as the first layer and the blocks (6, ...) of all layers."""
+        layer, backward = self._backward(planes, matrices.dtype)
+        squares = tuple((first, v * v, v * s, s * s) for first, v, s in backward)
+        return layer, _squared_diagonal(squares, matrices)
+
     def _forward(self, planes: slice, dtype: Any) -> tuple[Band, ...]:
         (first, values, slopes), *across = self._bands[dtype][0]
         return (first[planes], values[planes], slopes[planes]), *across
@@ -216,6 +222,43 @@ def _squared_jacobian(
     change = _jacobian(forward, control)
     dual = _times_matrices(matrices, change.reshape(9, change.shape[2]))
     return _jacobian_adjoint(backward, dual.reshape(change.shape))
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _squared_diagonal(squares: tuple[Band, Band, Band], matrices: Array) -> Array:
+    """Return the blocks on the diagonal of `_squared_jacobian`, as all layers (6, layers, n_v, n_w).
+
+    squares: bands as in `_jacobian_adjoint`, of the products value^2, value * slope and slope^2 of a basis function.
+    """
+    first_u, first_v, first_w = squares[0][0], squares[1][0], squares[2][0]
+    planes, n_v, n_w, width = len(first_u), len(first_v), len(first_w), squares[0][1].shape[1]
+    m_w = first_w[-1] + squares[2][1].shape[1]
+    m_v = matrices.shape[1] // (planes * m_w)
+    field = matrices.reshape(45, planes, m_w, m_v)
+    out = np.zeros((6, first_u[-1] + width, n_v, n_w), matrices.dtype)
+    entry = 0
+    for c in range(3):
+        for other in range(c + 1):
+            for d in range(3):
+                for e in range(d + 1):
+                    # a direction's basis function has its slope in none, one or both of the derivatives d and e
+                    in_u, in_v, in_w = (d == 0) + (e == 0), (d == 1) + (e == 1), (d == 2) + (e == 2)
+                    values_u = squares[0][1] if in_u == 0 else squares[0][2] if in_u == 1 else squares[0][3]
+                    values_v = squares[1][1] if in_v == 0 else squares[1][2] if in_v == 1 else squares[1][3]
+                    values_w = squares[2][1] if in_w == 0 else squares[2][2] if in_w == 1 else squares[2][3]
+                    for m in range(planes):
+                        across = field[SYMMETRIC[3 * c + d, 3 * other + e], m]
+                        if d != e:
+                            across = across + field[SYMMETRIC[3 * c + e, 3 * other + d], m]
+                        part, plain = np.zeros((n_w, m_v), out.dtype), np.zeros((n_v, n_w), out.dtype)
+                        apply_band(first_w, values_w, across, part)
+                        apply_band(first_v, values_v, np.ascontiguousarray(part.T), plain)
+                        for k in range(width):
+                            for i in range(n_v):
+                                for j in range(n_w):
+                                    out[entry, first_u[m] + k, i, j] += values_u[m, k] * plain[i, j]
+            entry += 1
+    return out
 
 
 def _graded_points(knots: Array, outer: int, inner: int) -> tuple[Array, Array]:

@@ -6,6 +6,8 @@ from functools import partial
 from itertools import islice
 from typing import Any, Generic, Protocol, TypeVar
 
+import numpy as np
+
 from ..arrays import Array, Floats
 from ..spline.spline_map import ControlNets
 from .operators import PiecewiseOperator
@@ -87,4 +89,9 @@ def side_by_side(nets: ControlNets, operators: Sequence[PiecewiseOperator]) -> P
     pieces: list[Callable[[Floats], Any]] = [
         partial(apply, piece, block) for block, operator in enumerate(operators) for piece in operator.pieces
     ]
-    return PiecewiseOperator(pieces, add)
+
+    def diagonal(like: Floats) -> Floats:
+        each = (operator.diagonal(nets.of_block(like, block)) for block, operator in enumerate(operators))
+        return np.concatenate([blocks.reshape(6, -1) for blocks in each], axis=1)
+
+    return PiecewiseOperator(pieces, add, diagonal)
