@@ -17,7 +17,7 @@ def solve_and_grow() -> None:
 
     By then the other process has compiled most of what both maps need.
     """
-    volume = iga_nn.BSplineVolume.from_function(lambda u, v, w: (u + v * w, v, w))
+    volume = iga_nn.BSplineVolume.from_function(lambda u, v, w: (u + 2 * v + v * w, v, w))
     iga_nn.certify(volume)
     solution = iga_nn.solve(volume, iga_nn.Poisson(exact="exp(X+Z)*sin(Y)"), refine=1)
     solution.all_extremes()
