@@ -28,8 +28,9 @@ from .training_points import TriangleSampler, stencils
 _log = logging.getLogger(__name__)
 State = dict[str, Floats]
 _CHECKPOINT, _CHECKPOINT_STEPS = "training", 100
-_COMPARED_STEPS = 8  # the last ones of a race, whose mean distortions are compared
-_RACE_GAIN = 0.05  # share by which the turned G must be better, first in concavity and then in distortion
+_COMPARED_STEPS = 8  # the last ones of a race, whose mean scores are compared
+_REST = 0.02  # share of the other terms in a race's score beside the distortion: a run may still be far from the cube
+_RACE_GAIN = 0.05  # share by which the turned G must be better, first in concavity and then in the score
 
 
 @dataclass
@@ -155,8 +156,7 @@ class Trainer:
 
         The turn puts the cube's edges out of hollows; without such a turn the stage begins once. Returns the better run
         and its optimiser; the network then has its state. The mapped domain is a ball at this stage. The turn is
-        computed beforehand, but only training shows whether it lowers the distortion, because corners may be harder to
-        reach.
+        computed beforehand, but only training shows whether it lowers the loss, because corners may be harder to reach.
         """
         train, begun = self.config.train, len(self.history.rows)
         away, start = self.mapped() - 0.5, self.network.state()
@@ -178,9 +178,10 @@ class Trainer:
                 pass
             rows = self.history.rows[begun:]
             del self.history.rows[begun:]
-            distortion = float(np.mean([terms["arap"] for *_, terms in rows[-_COMPARED_STEPS:]]))
-            if distortion < share * least:
-                least, winner = distortion, (run, optimizer, self.network.state(), rows)
+            last = [(loss, terms["arap"]) for _, _, loss, _, terms in rows[-_COMPARED_STEPS:]]
+            score = float(np.mean([distortion + _REST * (loss - distortion) for loss, distortion in last]))
+            if score < share * least:
+                least, winner = score, (run, optimizer, self.network.state(), rows)
         assert winner is not None
         run, optimizer, state, rows = winner
         self.network.restore(state)
