@@ -29,7 +29,7 @@ from .term import RoundWeights, Term, Weights
 _REACH = 0.03  # while F grows, surface points farther from F than this do not slide, and draw F in all directions
 _RELAXATIONS = 1  # sweeps over the triangles that these flipped: after every step, so that flips do not pile up
 _TOLERANCE, _ITERATIONS = 0.1, 7  # of a Newton direction, relative and at most: a better one does not save steps
-_ITERATIONS_OF_BLOCKS = 20  # at most, without the scaled preconditioner
+_MORE_ITERATIONS = 20  # at most, without the scaled preconditioner
 _SMOOTH_TOLERANCE, _SMOOTH_ITERATIONS = 1e-8, 5000  # of `smoothed`, whose result is a map and no direction
 
 
@@ -38,15 +38,18 @@ class SplineEnergy:
 
     The terms of `inner` depend on the control points alone; the terms of `outer` also depend on the surface's
     parameters.
+
+    One cube that has not grown starts near its map: its preconditioner is scaled, and points of the surface stay off
+    places where F's boundary faces away. A bone that grew so ended 1.8 times as far.
     """
 
-    def __init__(self, nets: ControlNets, surface: Correspondence, weights: Weights) -> None:
+    def __init__(self, nets: ControlNets, surface: Correspondence, weights: Weights, *, grown: bool = False) -> None:
         self.surface, self.nets = surface, nets
         self.anchors = Anchors(surface)
         self._alignment: AlignmentPenalty | None = None
         self._contact: ContactPenalty | None = None
         self._approach: Correspondence | None = None
-        self._weights, self._grows = weights, False
+        self._weights, self._grows, self._near = weights, False, nets.is_single and not grown
         self._round = RoundWeights(0.0, weights.surface)
         self._measure_in(np.ones((len(nets.knots), 3)), np.zeros(int(nets.first_spans[-1])))
 
@@ -62,7 +65,7 @@ class SplineEnergy:
         self.determinants = DeterminantPenalty(nets, knots)
         self.determinants.weigh(span_weights)
         self.inner: tuple[Term, ...] = (self.distortion, self.fairness, self.determinants)
-        self._precondition = Preconditioner(nets, self.fairness, self._round.surface)
+        self._precondition = Preconditioner(nets, self.fairness, self._round.surface, scaled=self._near)
 
     @property
     def outer(self) -> tuple[Term, ...]:
@@ -91,7 +94,7 @@ class SplineEnergy:
         if not self.nets.is_single or (share is None and not self._grows):
             return
         self._grows = share is not None
-        self._precondition = Preconditioner(self.nets, self.fairness, self._round.surface)
+        self._precondition = Preconditioner(self.nets, self.fairness, self._round.surface, scaled=self._near)
         reach = _REACH if self._grows else np.inf
         self.surface.hold(np.linalg.norm(self.surface.residuals(control), axis=1) > reach)
 
@@ -115,7 +118,7 @@ class SplineEnergy:
         if self._approach is not None:
             return
         sliding = self.surface.sliding
-        goals = self.surface.points, self.surface.normals if self.nets.is_single else None
+        goals = self.surface.points, self.surface.normals if self._near else None
         if self._grows:
             sliding.slide(control, *goals, keep_layout=True, reach=_REACH)
         else:
@@ -179,13 +182,13 @@ class SplineEnergy:
         self.distortion.damp(damping)
         terms = [(term.weight(self._round), term.curvature(control)) for term in (*self.inner, *self.outer)]
         operator, residual = weighted_sum(terms), right.astype(np.float32)
-        if self.nets.is_single:
+        if self._near:
             self._precondition.scale(operator.diagonal(residual))
         direction = conjugate_gradients(
             lambda x: self.nets.merged(operator(x)),
             residual,
             self._precondition,
             tolerance=_TOLERANCE,
-            max_iterations=_ITERATIONS if self.nets.is_single else _ITERATIONS_OF_BLOCKS,
+            max_iterations=_ITERATIONS if self._near else _MORE_ITERATIONS,
         ).x
         return np.asarray(direction, dtype=np.float64)

@@ -18,7 +18,7 @@ from .bending import Fairness
 from .tensor_product import KroneckerInverse
 
 _PULL = 1e-2  # share of the surface's weight in K: enough to bound its longest waves
-_PULL_OF_BLOCKS = 3e-4  # the same of several blocks: more would hold back slides along the surface
+_PULL_OF_K = 3e-4  # the same of K alone: more would hold back slides along the surface
 _LEAST = 1e-6  # of a pivot, relative to its entry on the diagonal: in single precision a block may be singular
 
 
@@ -28,10 +28,13 @@ class Preconditioner:
     The results of several blocks are averaged at interfaces.
     """
 
-    def __init__(self, nets: ControlNets, fairness: Fairness, surface: float) -> None:
-        """Make the inverse with the weight `surface` of the surface's data; L is the identity at first."""
+    def __init__(self, nets: ControlNets, fairness: Fairness, surface: float, *, scaled: bool) -> None:
+        """Make the inverse with the weight `surface` of the surface's data; L is the identity at first.
+
+        scaled: whether `scale` will be called.
+        """
         self._nets, self._inverses, entries = nets, list[KroneckerInverse](), []
-        pull = _PULL if nets.is_single else _PULL_OF_BLOCKS
+        pull = _PULL if scaled else _PULL_OF_K
         for term in fairness.terms:
             rough = term.with_stiffness()
             for matrix in rough:

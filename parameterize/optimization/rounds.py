@@ -61,7 +61,7 @@ def optimize(
     """
     checkpoints = checkpoints or Checkpoints.none()
     with one_blas_thread():
-        energy = SplineEnergy(start.nets, surface, weights)
+        energy = SplineEnergy(start.nets, surface, weights, grown=schedule.grown > 0)
         energy.determinants.activate(edge_spans(start.nets))
         if watched is not None:
             energy.determinants.activate(watched)
