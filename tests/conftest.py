@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import functools
 import inspect
+import locale
 import os
 import shutil
 import signal
@@ -96,6 +97,14 @@ def told(result: Any, when_made: Any) -> Any:
     if when_made is not None:
         when_made(result.volume, result.history)
     return result
+
+
+@pytest.fixture(autouse=True)
+def same_locale() -> Iterator[None]:
+    """Take back the locale that VTK leaves behind after it writes a .vtk file of a test."""
+    before = locale.setlocale(locale.LC_ALL)
+    yield
+    locale.setlocale(locale.LC_ALL, before)
 
 
 @pytest.fixture

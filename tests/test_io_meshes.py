@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import locale
 import re
 
 import numpy as np
@@ -59,6 +60,14 @@ def test_c3d27_with_its_inner_node_last_is_refused(tmp_path):
 def test_vtk(tmp_path, kind, ending):
     as_vtk(grid(kind, (2, 2, 2), bent)).save(tmp_path / f"a{ending}")
     expect_bent(iga_nn.load_mesh(tmp_path / f"a{ending}"), kind, 0)
+
+
+def test_reading_leaves_the_locale(tmp_path):
+    before = locale.setlocale(locale.LC_ALL)
+    as_vtk(grid(HEX8, (1, 1, 1), bent)).save(tmp_path / "a.vtk")
+    locale.setlocale(locale.LC_ALL, before)
+    iga_nn.load_mesh(tmp_path / "a.vtk")
+    assert locale.setlocale(locale.LC_ALL) == before
 
 
 def test_vtu_before_version_2_1_has_two_edges_of_hexahedra_exchanged(tmp_path):

@@ -1,5 +1,6 @@
 """Reads the solid cells of .vtu files, and of .vtk and CGNS files by VTK: linear, quadratic, Lagrange, Bezier."""
 
+import locale
 import re
 import subprocess
 import sys
@@ -150,11 +151,13 @@ def _read(path: Path) -> Any:
     reader.AddObserver("ErrorEvent", lambda *_: faults.append("error"))
     reader.SetFileName(str(path))
     shown, level = vtkObject.GetGlobalWarningDisplay(), vtkLogger.GetCurrentVerbosityCutoff()
+    spoken = locale.setlocale(locale.LC_ALL)  # the reader leaves "C" behind: Python would open texts as ASCII
     vtkObject.SetGlobalWarningDisplay(0)
     vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_OFF)
     try:
         reader.Update()
     finally:
+        locale.setlocale(locale.LC_ALL, spoken)
         vtkObject.SetGlobalWarningDisplay(shown)
         vtkLogger.SetStderrVerbosity(level)
     found = reader.GetOutputDataObject(0)

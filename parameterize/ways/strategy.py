@@ -119,6 +119,7 @@ def attempts(task: MappingTask, ways: tuple[Way, ...], checkpoints: Checkpoints)
     """
     with timed(task.seconds, "fit"), one_blas_thread():
         first, suits = first_way(task, ways)
+    check_time()  # a fast way would end before the clock is looked at
     if suits.why:
         _log.log(suits.level, "%s", suits.why)
     task.checkpoints.save(_CHECKPOINT, {}, {"way": first.name, "why": suits.why})
@@ -133,7 +134,6 @@ def attempts(task: MappingTask, ways: tuple[Way, ...], checkpoints: Checkpoints)
             cut_short(f"the ways to a map, before {way.name}")
             break
         try:
-            check_time()
             attempt = way.make(task, checkpoints.of_part(len(tried)) if tried else checkpoints)
         except OutOfTime:
             if not has_map:
