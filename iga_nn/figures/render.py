@@ -33,14 +33,14 @@ REMEDY = "apt-get install --no-install-recommends libegl1 libgl1-mesa-dri"
 CANNOT_DRAW = f"VTK cannot draw on this machine; remedy: {REMEDY}"
 
 
-class _Windows(local):
-    """Hold the open windows of a thread by their size: a window of EGL draws in the thread that opens it."""
+class _Plotters(local):
+    """Hold a thread's plotters by size of window: a window of EGL draws in the thread that opens it."""
 
     def __init__(self) -> None:
-        self.plotters: dict[tuple[int, int], Any] = {}
+        self.of_size: dict[tuple[int, int], Any] = {}
 
 
-_WINDOWS = _Windows()
+_PLOTTERS = _Plotters()
 
 
 @dataclass(frozen=True, eq=False)
@@ -188,7 +188,7 @@ def _empty_plotter(pixels: tuple[int, int]) -> Any:
     """Return a plotter with an empty scene, one for each size: a new window costs more than its picture."""
     import pyvista
 
-    plotters = _WINDOWS.plotters
+    plotters = _PLOTTERS.of_size
     if pixels not in plotters:
         plotters[pixels] = pyvista.Plotter(off_screen=True, window_size=list(pixels), lighting="none")
         plotters[pixels].set_background("white")
