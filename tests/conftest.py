@@ -21,6 +21,7 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")  # before the libraries that read 
 for _number in (signal.SIGINT, signal.SIGTERM):
     if signal.getsignal(_number) is signal.SIG_IGN:  # `nohup make test &`; what the tests start would inherit it
         signal.signal(_number, lambda *_: None)  # so it is ignored here alone: a new program starts with the default
+LOCALE = locale.setlocale(locale.LC_ALL)
 STAGES = ("S(2)", "S(1)", "cube", "corners", "edges")
 
 
@@ -100,11 +101,9 @@ def told(result: Any, when_made: Any) -> Any:
 
 
 @pytest.fixture(autouse=True)
-def same_locale() -> Iterator[None]:
-    """Take back the locale that VTK leaves behind after it writes a .vtk file of a test."""
-    before = locale.setlocale(locale.LC_ALL)
-    yield
-    locale.setlocale(locale.LC_ALL, before)
+def same_locale() -> None:
+    """Take back the locale that VTK leaves behind where a test, or what it is collected from, writes a .vtk file."""
+    locale.setlocale(locale.LC_ALL, LOCALE)
 
 
 @pytest.fixture
