@@ -10,6 +10,7 @@ import igl
 import numpy as np
 
 from ..arrays import Array, IntArray
+from .collapses import collapsed
 from .errors import MeshError, check_face_limit
 from .geometry import doubled_areas
 from .groups import renumbered
@@ -17,7 +18,6 @@ from .surface import Surface, surface_from_arrays
 
 MOST_FITTED = 40_000  # faces: a surface of more is fitted on a copy; below, the copy would hardly be faster
 FITTED = 30_000  # faces of the copy
-FINER = 4  # times as many faces are left by the first collapses: if triangles meet in the end, these are not repeated
 
 
 def decimate(surface: Surface, max_faces: int) -> Surface:
@@ -57,27 +57,20 @@ def _reduced(surface: Surface, max_faces: int) -> tuple[Surface, float]:
     Raises MeshError where there is none.
     """
     whole = np.asfortranarray(surface.unit_vertices), surface.faces
-    if len(surface.crossings) == 0:
-        start = igl.qslim(*whole, FINER * max_faces)[:2] if len(surface.faces) > FINER * max_faces else whole
-        for block in (False, True):  # the first in a third of the time
-            try:
-                found, moved = _collapsed(surface, start, max_faces, block=block)
-            except MeshError:
-                continue  # triangles that meet may end up as one
-            if len(found.crossings) == 0:
-                return found, moved
-    return _collapsed(surface, whole, max_faces, block=True)
+    if not len(surface.crossings):
+        vertices, faces = collapsed(surface.unit_vertices, surface.faces, max_faces)
+        try:
+            found = _checked(surface, vertices, faces, max_faces)
+            if not len(found[0].crossings):
+                return found
+        except MeshError:
+            pass  # triangles that meet may end up as one
+    vertices, faces, *_ = igl.qslim(*whole, max_faces, block_intersections=True)
+    return _checked(surface, vertices, faces, max_faces)
 
 
-def _collapsed(
-    surface: Surface, start: tuple[Array, IntArray], max_faces: int, *, block: bool
-) -> tuple[Surface, float]:
-    """Return the surface after collapses of its edges, and how far it moved.
-
-    start: the placed vertices and the faces to begin with. block: whether collapses that make triangles meet are left
-    out.
-    """
-    vertices, faces, *_ = igl.qslim(np.asfortranarray(start[0]), start[1], max_faces, block_intersections=block)
+def _checked(surface: Surface, vertices: Array, faces: IntArray, max_faces: int) -> tuple[Surface, float]:
+    """Return the surface of fewer triangles, by their placed vertices (n, 3), and how far it moved."""
     if len(faces) > max_faces:
         name = surface.source or surface.name
         raise MeshError(f"{name}: cannot be decimated below {len(faces)} faces: raise --max-faces")
