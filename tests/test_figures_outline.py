@@ -8,7 +8,7 @@ import iga_nn
 from iga_nn.figures.fields import outer_faces, points_of
 from iga_nn.figures.first_view import Cells, shown_from, views_of
 from iga_nn.figures.outline import outline_of, outward
-from iga_nn.figures.render import longest_first
+from iga_nn.figures.render import Patch, longest_first, thinned
 from iga_nn.report.packed import Drawn
 from iga_nn.report.viewer import scene_of
 from parameterize.spline.volume import BSplineVolume
@@ -74,3 +74,14 @@ def test_layers_have_the_regions_and_the_singular_places():
     assert names[0].startswith("value: nz > 0.99") and names[1].startswith("exchange: nx > 0.9")
     assert scene["singular"]["texts"] == [place.text for place in heated.singular] and scene["edges"]
     assert isinstance(Drawn(outer_faces(volume), 1).thinned(points_of(volume))[0], np.ndarray)
+
+
+def test_a_flat_face_is_drawn_of_fewer_samples_and_a_bent_one_of_all():
+    u, v = np.meshgrid(*[np.linspace(0.0, 1.0, 121)] * 2, indexing="ij")
+    flat = np.stack([u, v, u + v], axis=-1)[None]
+    bent = np.stack([u, v, u**2], axis=-1)[None]
+    even, uneven = np.ones_like(flat), np.abs(np.sin(40.0 * flat))
+    assert thinned(Patch(flat, even), 1.7).points.shape == (1, 16, 16, 3)
+    assert thinned(Patch(bent, even), 1.7).points.shape == (1, 121, 16, 3)
+    assert thinned(Patch(flat, uneven), 1.7).points.shape == (1, 121, 121, 3)
+    assert thinned(Patch(flat[:, :2, :2], even[:, :2, :2]), 0.0).points.shape == (1, 2, 2, 3)

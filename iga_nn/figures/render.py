@@ -29,6 +29,7 @@ NEARER_LINES, NEARER_MARKS = 0.003, 0.01  # of the scene's size, towards the vie
 NAMELESS: Mapping[str, Array] = MappingProxyType({})
 LETTERS = 15  # pixels
 ROOM = 1.3  # of the picture's scale, for axes and their numbers
+PLACE, SHADE = 2e-5, 1e-2  # of the scene's size, and of red, green or blue: less is not seen
 REMEDY = "apt-get install --no-install-recommends libegl1 libgl1-mesa-dri"
 CANNOT_DRAW = f"VTK cannot draw on this machine; remedy: {REMEDY}"
 
@@ -148,9 +149,12 @@ def draw(
     import pyvista
 
     plotter = _empty_plotter(pixels)
+    cloud = np.concatenate([patch.points.reshape(-1, 3) for patch in patches])
+    size = float(np.linalg.norm(np.ptp(cloud, axis=0)))
+    fewer = [thinned(patch, size) for patch in patches]
     for lit, opacity in dict.fromkeys((patch.lit, patch.opacity) for patch in patches):
         plotter.add_mesh(
-            _mesh([patch for patch in patches if (patch.lit, patch.opacity) == (lit, opacity)]),
+            _mesh([patch for patch in fewer if (patch.lit, patch.opacity) == (lit, opacity)]),
             scalars="rgb",
             rgb=True,
             smooth_shading=lit,
@@ -159,8 +163,7 @@ def draw(
             diffuse=0.55,
             opacity=opacity,
         )
-    cloud = np.concatenate([patch.points.reshape(-1, 3) for patch in patches])
-    nearer = float(np.linalg.norm(np.ptp(cloud, axis=0))) * view.towards
+    nearer = size * view.towards
     _add_lines(plotter, patches, NEARER_LINES * nearer)
     if marks is not None:
         plotter.add_points(marks + NEARER_MARKS * nearer, color="black", point_size=32, render_points_as_spheres=True)
@@ -195,6 +198,29 @@ def _empty_plotter(pixels: tuple[int, int]) -> Any:
     plotters[pixels].suppress_rendering = True  # until the scene is complete
     plotters[pixels].clear()
     return plotters[pixels]
+
+
+def thinned(patch: Patch, size: float) -> Patch:
+    """Return a patch without samples that its others show as well: the time of a picture is that of its triangles.
+
+    size: of the scene.
+    """
+    both = np.concatenate([patch.points / (PLACE * size or 1.0), patch.colors / SHADE], axis=-1)
+    down = _step(np.moveaxis(both, -3, 0))
+    both = both[..., ::down, :, :]
+    across = _step(np.moveaxis(both, -2, 0))
+    return replace(patch, points=patch.points[..., ::down, ::across, :], colors=patch.colors[..., ::down, ::across, :])
+
+
+def _step(rows: Array) -> int:
+    """Return the step in which rows (m, ...) are as good as all of them: those between are met within 1."""
+    step, left = 1, 1.0
+    while len(rows) > 2 and len(rows) % 2:
+        left -= float(np.abs(rows[1::2] - 0.5 * (rows[:-2:2] + rows[2::2])).max())
+        if not left > 0.0:
+            break
+        rows, step = rows[::2], 2 * step
+    return step
 
 
 def _mesh(patches: Sequence[Patch]) -> Any:
