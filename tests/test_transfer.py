@@ -9,7 +9,7 @@ from small_run import small_surface, tiny_config
 
 from parameterize.quality.distances import two_sided
 from parameterize.run import corner_vertices, parameterize
-from parameterize.surface import decimation
+from parameterize.surface import collapses, decimation
 from parameterize.surface.surface import surface_from_arrays
 
 pytestmark = pytest.mark.usefixtures("few_distances")
@@ -75,7 +75,7 @@ def test_what_cannot_be_reduced_is_fitted_as_it_is(small_limits, monkeypatch):
         return np.eye(4, 3), np.array([[0, 1, 2]])
 
     surface = surface_from_arrays(*igl.upsample(small_surface().vertices, small_surface().faces, 2))
-    monkeypatch.setattr(decimation, "collapsed", torn)
+    monkeypatch.setattr(collapses, "collapsed", torn)
     monkeypatch.setattr(decimation.igl, "qslim", torn)
     copy, notice = surface.fitted
     assert copy is surface and "which takes long" in notice

@@ -10,7 +10,6 @@ import igl
 import numpy as np
 
 from ..arrays import Array, IntArray
-from .collapses import collapsed
 from .errors import MeshError, check_face_limit
 from .geometry import doubled_areas
 from .groups import renumbered
@@ -58,6 +57,8 @@ def _reduced(surface: Surface, max_faces: int) -> tuple[Surface, float]:
     """
     whole = np.asfortranarray(surface.unit_vertices), surface.faces
     if not len(surface.crossings):
+        from .collapses import collapsed
+
         vertices, faces = collapsed(surface.unit_vertices, surface.faces, max_faces)
         try:
             found = _checked(surface, vertices, faces, max_faces)

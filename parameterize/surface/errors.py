@@ -5,6 +5,7 @@ from numbers import Integral
 import numpy as np
 
 from ..arrays import Array, IntArray
+from .geometry import used_vertices
 
 LARGEST = 1e90  # coordinate: volumes beyond its cube leave double precision
 
@@ -40,7 +41,7 @@ def check_face_limit(max_faces: int) -> None:
 
 def check_finite(vertices: Array, faces: IntArray) -> None:
     """Raise MeshError where faces use coordinates that are NaN, infinite or too large to compute volumes with."""
-    used = np.unique(faces)
+    used = used_vertices(faces)
     places = vertices[used]
     broken = used[~np.isfinite(places).all(axis=1)]
     if len(broken):

@@ -15,6 +15,11 @@ def edge_table(faces: IntArray) -> tuple[IntArray, IntArray]:
     return np.stack([keys // base, keys % base], axis=1), counts
 
 
+def used_vertices(faces: IntArray) -> IntArray:
+    """Return the numbers of the vertices that faces use, ascending; negative ones are refused."""
+    return np.flatnonzero(np.bincount(faces.ravel()))
+
+
 def directed_edges(faces: IntArray) -> IntArray:
     """Return the edges (3 m, 2) in the direction of each face; edge k of face i is row 3 i + k."""
     return faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)

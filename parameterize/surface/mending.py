@@ -11,6 +11,7 @@ import numpy as np
 from ..arrays import Array, IntArray, listed
 from .bodies import Choice, check_choice, choose_component
 from .errors import LARGEST, MeshError, check_face_count
+from .geometry import used_vertices
 from .gluing import Solids, glued
 from .holes import Close, check_close, close_holes
 from .mesh_repair import MeshRepair
@@ -118,7 +119,7 @@ def without_defects(raw: RawMesh, max_faces: int) -> tuple[MeshRepair, list[str]
 
 def _box(vertices: Array, faces: IntArray) -> tuple[Array, float, list[str]]:
     """Return the middle (3,) and the longest side of the used vertices' box, and notices of its size and place."""
-    used = vertices[np.unique(faces)]
+    used = vertices[used_vertices(faces)]
     low, high = used.min(axis=0), used.max(axis=0)
     size = float((high - low).max())
     if size < 1.0 / LARGEST:

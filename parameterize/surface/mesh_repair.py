@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..arrays import Array, IntArray, in_brackets
+from .geometry import used_vertices
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,6 +48,8 @@ class MeshRepair:
 
     def compact(self) -> "MeshRepair":
         """Return the mesh without the vertices that no face uses."""
-        kept, numbers = np.unique(self.faces, return_inverse=True)
-        faces = numbers.reshape(-1, 3).astype(np.int64)
+        kept = used_vertices(self.faces)
+        numbers = np.zeros(len(self.vertices), dtype=np.int64)
+        numbers[kept] = np.arange(len(kept))
+        faces = numbers[self.faces]
         return replace(self, vertices=self.vertices[kept], points=self.points[kept], faces=faces)

@@ -6,7 +6,8 @@ from scipy.spatial import KDTree
 
 from ..arrays import Array, IntArray, Mask
 from .errors import MeshError
-from .geometry import connected, directed_edges, doubled_areas, edge_table
+from .geometry import connected, directed_edges, doubled_areas, edge_table, used_vertices
+from .soundness import is_sound
 
 WELD_TOLERANCE = 1e-7  # share of the box's longest side: points this close are one in single precision
 FLAT = 1e-14  # twice a face's area over its longest edge squared, below which it counts as degenerate
@@ -14,7 +15,7 @@ FLAT = 1e-14  # twice a face's area over its longest edge squared, below which i
 
 def is_closed(faces: IntArray) -> bool:
     """Return whether every edge has exactly two faces."""
-    return len(faces) > 0 and bool(np.all(edge_table(faces)[1] == 2))
+    return is_sound(faces) or (len(faces) > 0 and bool(np.all(edge_table(faces)[1] == 2)))
 
 
 def weld_and_drop(vertices: Array, faces: IntArray) -> tuple[IntArray, IntArray, list[str]]:
@@ -28,7 +29,7 @@ def weld_and_drop(vertices: Array, faces: IntArray) -> tuple[IntArray, IntArray,
     kept = np.flatnonzero(_distinct(faces))
     solid = faces[kept]
     closed = is_closed(solid)
-    edges = edge_table(solid)[0]
+    edges = directed_edges(solid)
     short = edges[np.linalg.norm(np.subtract(*vertices[edges.T]), axis=1) <= WELD_TOLERANCE]
     label = connected(short if closed else close_pairs(vertices, solid), len(vertices))
     welded = np.unique(label, return_index=True)[1][label][solid]  # the lowest number of the joined vertices
@@ -40,12 +41,13 @@ def weld_and_drop(vertices: Array, faces: IntArray) -> tuple[IntArray, IntArray,
     if not is_closed(welded):
         thick = _areas(vertices, welded) > FLAT
         welded, kept = welded[thick], kept[thick]
-    removed = len(np.unique(faces)) - len(np.unique(welded)) if len(welded) else 0
+    used = len(used_vertices(faces))
+    removed = used - len(used_vertices(welded)) if len(welded) else 0
     if removed:
         notices.append(f"welded {removed} duplicate vertices (closer than {WELD_TOLERANCE:g} of the size)")
     if len(faces) > len(welded):
         notices.append(f"dropped {len(faces) - len(welded)} degenerate faces")
-    unused = len(vertices) - len(np.unique(faces))
+    unused = len(vertices) - used
     if unused:
         notices.append(f"dropped {unused} vertices that no face uses")
     return welded, kept, notices
@@ -64,6 +66,8 @@ def wind_alike(faces: IntArray) -> tuple[IntArray, list[str]]:
 
 def is_oriented(faces: IntArray) -> bool:
     """Return whether no two faces run along an edge in the same direction."""
+    if is_sound(faces):
+        return True
     edges = directed_edges(faces)
     keys = edges[:, 0] * (int(faces.max()) + 1) + edges[:, 1]
     return len(np.unique(keys)) == len(keys)
@@ -83,7 +87,7 @@ def _areas(vertices: Array, faces: IntArray) -> Array:
 
 def close_pairs(vertices: Array, faces: IntArray) -> IntArray:
     """Return pairs (k, 2) that link used vertices within the tolerance: in cells of a fine grid, then between cells."""
-    used = np.unique(faces)
+    used = used_vertices(faces)
     cell = np.zeros(len(used), dtype=np.int64)
     for axis in range(3):
         rank = np.unique(np.floor(vertices[used, axis] / WELD_TOLERANCE), return_inverse=True)[1]
