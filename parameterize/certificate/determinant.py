@@ -52,9 +52,18 @@ class DeterminantForm:
         return np.asarray(np.einsum("i,j,k->ijk", *(np.diff(b) for b in self.breaks)).ravel())
 
     def survey(self) -> tuple[Array, Array, Array]:
+        """Return what `survey_of` does for all spans of all patches.
+
+        The shapes are (2, patches, spans), (2, patches, spans) and (patches, spans).
+        """
+        found = self.survey_of(np.arange(self.patch_count * self.span_count))
+        bounds, corners, means = (row.reshape(*row.shape[:-1], self.patch_count, self.span_count) for row in found)
+        return bounds, corners, means
+
+    def survey_of(self, spans: IntArray) -> tuple[Array, Array, Array]:
         """Return lower bounds of det J and of -det J, the least values of both at the 8 corners, and means of det J.
 
-        For all spans of all patches: (2, patches, spans), (2, patches, spans) and (patches, spans).
+        spans: flat numbers (k,), see `numbers`. The shapes are (2, k), (2, k) and (k,).
         """
 
         def part(chunk: IntArray) -> tuple[Array, Array, Array]:
@@ -65,10 +74,10 @@ class DeterminantForm:
                 values.mean(axis=(0, 1, 2)),
             )
 
-        count = self.patch_count * self.span_count
-        chunks = [np.arange(i, min(i + CHUNK, count)) for i in range(0, count, CHUNK)]
-        rows = (np.concatenate(parts, axis=-1) for parts in zip(*in_parallel(part, chunks), strict=True))
-        bounds, corners, means = (row.reshape(*row.shape[:-1], self.patch_count, self.span_count) for row in rows)
+        chunks = [spans[i : i + CHUNK] for i in range(0, max(len(spans), 1), CHUNK)]
+        bounds, corners, means = (
+            np.concatenate(parts, axis=-1) for parts in zip(*in_parallel(part, chunks), strict=True)
+        )
         return bounds, corners, means
 
     def coefficients(self, spans: IntArray) -> tuple[Array, Array]:

@@ -16,8 +16,10 @@ import numpy as np
 
 from ..arrays import Array, IntArray, Mask
 from ..spline.bernstein import split
+from ..spline.orientation import enclosed_volumes
 from ..spline.patch_groups import PatchGroup
 from ..spline.volume import BSplineVolume
+from .column_ranges import bounds_by_ranges
 from .determinant import CHUNK, DeterminantForm, corners_of
 from .rational_determinant import RationalDeterminantForm
 
@@ -28,6 +30,7 @@ CLAIMS = {"right-handed": "det J > 0", "left-handed": "det J < 0"}
 _NONE: IntArray = np.empty((0, 3), dtype=np.int64)
 _PATCHES = 4096  # patches at a time: a bound of the memory
 _PIECES = 64  # pieces at a time
+_NEARLY = 1.0 - 1e-6  # a bound above this share of the least known value need not be closer: rounding parts them
 _TIGHT = 0.5  # a proved bound below this share of the least known value of det J is refined
 
 
@@ -97,11 +100,8 @@ def certify_patches(patches: Sequence[BSplineVolume], group: PatchGroup, max_dep
 def _certified(group: PatchGroup, patches: Sequence[BSplineVolume], max_depth: int) -> list[PatchCertificate]:
     """Return the certificates of the patches of a group, (k,) as given."""
     form = DeterminantForm(group) if group.weights is None else RationalDeterminantForm(group)
-    both_bounds, both_corners, means = form.survey()
-    mean = (means * form.span_sizes()).sum(axis=1)
+    bounds, known, mean = _surveyed(form, group)
     left = mean < 0.0
-    side, rows = left.astype(np.int64), np.arange(len(group))
-    bounds, known = both_bounds[side, rows], both_corners[side, rows].min(axis=1)
     size = np.ldexp(mean, form.exponents)
     with np.errstate(divide="ignore", invalid="ignore"):
         lowest = bounds.min(axis=1) / np.abs(mean)
@@ -112,6 +112,43 @@ def _certified(group: PatchGroup, patches: Sequence[BSplineVolume], max_depth: i
         search = _Search(form, row, float(mean[row]), max_depth, float(known[row]))
         found[row] = _searched(search, patches[row], bounds[row], doubtful[row], found[row])
     return found
+
+
+def _surveyed(form: DeterminantForm, group: PatchGroup) -> tuple[Array, Array, Array]:
+    """Return lower bounds (k, spans), the least known values (k,) and the means (k,) of det J, in the form's scale.
+
+    Of a left-handed patch the bounds and the values are those of -det J. Where most spans have a bound by the ranges of
+    J's columns, Bernstein coefficients are computed for those spans alone whose bound is below the least known value.
+    """
+    by_ranges = np.zeros((len(group), form.span_count))
+    if group.weights is None and form.span_count > CHUNK:
+        by_ranges = bounds_by_ranges(group, form.nets)
+    if 2 * np.abs(np.sign(by_ranges).sum(axis=1)).min() < form.span_count:
+        both_bounds, both_corners, means = form.survey()
+        mean = (means * form.span_sizes()).sum(axis=1)
+        side, rows = (mean < 0.0).astype(np.int64), np.arange(len(group))
+        return both_bounds[side, rows], both_corners[side, rows].min(axis=1), mean
+    mean = _means(form, group)
+    bounds = np.where(mean < 0.0, -1.0, 1.0)[:, None] * by_ranges
+    known, left = np.full(len(group), np.inf), np.repeat(mean < 0.0, form.span_count).astype(np.int64)
+    open_, done = bounds <= np.sort(bounds, axis=1)[:, CHUNK - 1 : CHUNK], np.zeros_like(bounds, dtype=bool)
+    while open_.any():
+        spans = np.flatnonzero(open_)
+        both_bounds, both_corners, _ = form.survey_of(spans)
+        chosen = left[spans], np.arange(len(spans))
+        bounds.ravel()[spans] = both_bounds[chosen]
+        np.minimum.at(known, spans // form.span_count, both_corners[chosen])
+        done |= open_
+        open_ = ~done & (bounds <= np.maximum(0.0, _NEARLY * known)[:, None])
+    return bounds, known, mean
+
+
+def _means(form: DeterminantForm, group: PatchGroup) -> Array:
+    """Return the means of det J over polynomial patches (k,), in the form's scale."""
+    points = group.control_points
+    middles = (points.min(axis=(1, 2, 3)) + points.max(axis=(1, 2, 3))) / 2.0
+    near = replace(group, control_points=points - middles[:, None, None, None])
+    return np.ldexp(enclosed_volumes(near, np.zeros(3)), -form.exponents)
 
 
 def _searched(
