@@ -7,6 +7,7 @@ from types import FrameType
 
 from .signals import loses_errors
 
+OBJECTS = 20_000  # new ones before Python looks for cycles: libraries make hundreds of thousands that stay
 PAUSE = 0.1  # seconds after which an interruption is tried again
 
 
@@ -14,6 +15,7 @@ def run_and_exit() -> None:
     """Run the command line on the program's arguments."""
     try:
         catch_signals()
+        gc.set_threshold(OBJECTS)
         from .cli.commands import main
 
         code = main(sys.argv[1:])

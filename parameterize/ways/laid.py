@@ -27,6 +27,7 @@ from .mapping_task import MappingTask
 from .way import Attempt, Way
 
 _CHECKPOINT = "first"
+_SAMPLES = 80  # a direction of a face: the nearest points are found closely afterwards
 
 
 class Laid(Way):
@@ -44,8 +45,12 @@ class Laid(Way):
             first = kept_blocks(checkpoints, lambda: self._laid(task))
             fit = _correspondence(task, first)
         with timed(task.seconds, "optimize"), one_blas_thread():
-            laid = CertifiedMap.of(first)
+            laid = self.certified(first)
         return Attempt(laid, Course(Counter(), {}, self.why), fit, Weights())
+
+    def certified(self, first: SplineMap) -> CertifiedMap:
+        """Return the map with its certificate at volume 1."""
+        return CertifiedMap.of(first)
 
     def _laid(self, task: MappingTask) -> SplineMap:
         """Return the map that `lay` makes, once for a run: the forecast asks first."""
@@ -70,7 +75,7 @@ def _correspondence(task: MappingTask, first: SplineMap) -> Correspondence:
     """Return the surface's vertices with their places on the blocks, in double precision."""
     points, faces = task.surface.to_unit(task.surface.vertices), task.surface.faces
     body = first.body
-    patches, parameters, _ = nearest_on_boundary(points, body, SampledBoundary.of(body))
+    patches, parameters, _ = nearest_on_boundary(points, body, SampledBoundary.of(body, _SAMPLES))
     outer = np.array([[name in names for name in FACE_NAMES] for names in body.outer])
     owners = 6 * patches + np.argmax(on_faces(parameters) & outer[patches], axis=1)
     return task.correspondence(SlidingParameters(first.nets, parameters, owners, faces), points)

@@ -4,9 +4,12 @@ The blocks are trilinear, and a spline of any degree has them exactly. Each face
 blocks, and each of its edges of edges of blocks.
 """
 
+from dataclasses import replace
+
 from ..layouts.complex import Complex, spline_of
 from ..layouts.planes.exact_blocks import exact_blocks
-from ..optimization.endings import Reason
+from ..optimization.endings import CertifiedMap, Reason
+from ..spline.bspline import open_uniform_knots
 from ..spline.spline_map import SplineMap
 from ..threads import one_blas_thread
 from .laid import Laid, in_words
@@ -33,8 +36,22 @@ class BoundedByPlanes(Laid):
         assert blocks is not None, "the way suits the body"
         return spline_of(blocks, task.config.spline.degree)
 
+    def certified(self, first: SplineMap) -> CertifiedMap:
+        """Return the map with the certificate of its blocks by their corners: further knots leave them as they are."""
+        return replace(CertifiedMap.of(_by_corners(first)), spline=first)
+
 
 PLANES = BoundedByPlanes("planes", "laying exact blocks along the planes")
+
+
+def _by_corners(first: SplineMap) -> SplineMap:
+    """Return a map of trilinear blocks by the corners of each, as one span."""
+    nets = first.nets
+    fewer = replace(nets, degree=1, knots=((open_uniform_knots(2, 1),) * 3,) * len(nets.knots))
+    blocks = (nets.of_block(first.control, block) for block in range(len(nets.knots)))
+    return SplineMap(
+        fewer, fewer.joined([net[:, :: n - 1, :: m - 1, :: k - 1] for net in blocks for n, m, k in [net.shape[1:]]])
+    )
 
 
 def _exact_blocks(task: MappingTask) -> Complex | None:
