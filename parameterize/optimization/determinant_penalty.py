@@ -8,6 +8,7 @@ Few coefficients lie below the floor. A coefficient is linear in each of the thr
 derivative is computed from the product of the other two: one row of 3 (p + 1)^3 numbers in the span's Bezier points.
 """
 
+from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
 
@@ -25,6 +26,7 @@ from .term import Blockwise, RoundWeights
 
 MIN_COEFFICIENT = 0.1  # a Bernstein coefficient of det J below this is penalised on active spans; mean det J is 1
 _BLOCK = 32  # spans at a time: their arrays fit into the cache
+_EVALUATIONS = 2  # that are kept for the curvature: the last one may be of a guess that was not taken
 _MOST_KEPT = 300e6  # bytes of rows that are kept from product to product; those of further spans are made anew
 
 
@@ -62,19 +64,24 @@ class _Rows:
 
     spans: _PenaltySpans
     shortfall: Array
-    shares: Array
-    rows: Array
+    shares: Floats
+    rows: Floats
     starts: IntArray
 
     def in_control_points(self) -> "_Rows":
-        """Return the derivatives in the control points that act on each span, in place of its Bezier points."""
+        """Return the derivatives in the control points that act on each span, in single precision.
+
+        They take the place of the derivatives in its Bezier points.
+        """
         n = self.rows.shape[2]
-        u, v, w = np.moveaxis(self.spans.weights, 1, 0)
-        to_bezier = np.einsum("sai,sbj,sck->sabcijk", u, v, w).reshape(-1, n**3, n**3).astype(self.rows.dtype)
-        rows = np.empty_like(self.rows)
+        u, v, w = np.moveaxis(self.spans.weights.astype(np.float32), 1, 0)
+        across = (u[:, :, None, :, None] * v[:, None, :, None, :]).reshape(-1, n**2, n**2)
+        to_bezier = (across[:, :, None, :, None] * w[:, None, :, None, :]).reshape(-1, n**3, n**3)
+        single = self.rows.astype(np.float32)
+        rows = np.empty_like(single)
         for matrix, begin, end in zip(to_bezier, self.starts, self.starts[1:], strict=False):
-            rows[begin:end] = (self.rows[begin:end].reshape(-1, n**3) @ matrix).reshape(rows[begin:end].shape)
-        return replace(self, rows=rows)
+            np.matmul(single[begin:end].reshape(-1, n**3), matrix, out=rows[begin:end].reshape(-1, n**3))
+        return replace(self, rows=rows, shares=self.shares.astype(np.float32))
 
     def squared(self, x: Floats) -> _Windows:
         """Return the windows of `in_control_points`: the transposed rows times their shares, times the rows of x."""
@@ -99,6 +106,7 @@ class BlockDeterminants:
         self._unscale = np.einsum("i,j,k->ijk", *(1.0 / binomials(3 * degree - 1),) * 3)
         self._share = 1.0 / (self._unscale.size * count)
         self._pieces: list[_PenaltySpans] = []
+        self._kept = deque[tuple[Array, list[_Rows]]](maxlen=_EVALUATIONS)
 
     def weigh(self, weights: Array, lowered_floors: Array) -> None:
         """Set the weights of all spans, and the shares to which their floors are lowered, (n_u, n_v, n_w) each."""
@@ -111,6 +119,7 @@ class BlockDeterminants:
         blocks = [slice(start, start + _BLOCK) for start in range(0, len(first), _BLOCK)]
         back = np.ascontiguousarray(np.swapaxes(bezier, 2, 3))
         self._pieces = [_PenaltySpans(first[b], volumes[b], floors[b], shares[b], bezier[b], back[b]) for b in blocks]
+        self._kept.clear()
 
     def weight(self, weights: RoundWeights) -> float:
         """Return the weight of the penalties on folds in a round."""
@@ -119,44 +128,49 @@ class BlockDeterminants:
     def energy_and_gradient(self, control: Array) -> tuple[float, Array]:
         """Return the penalty at control points (3, n_u, n_v, n_w), and its gradient of the same shape."""
 
-        def part(spans: _PenaltySpans) -> tuple[float, IntArray, Array]:
+        def part(spans: _PenaltySpans) -> tuple[_Rows, float, _Windows]:
             found = self._short_rows(control, spans)
             pull = found.shares * found.shortfall
             pushed = _combine(found.rows, found.starts, -2.0 * pull, found.spans.back)
-            return float(pull @ found.shortfall), found.spans.first, pushed
+            return found, float(pull @ found.shortfall), (found.spans.first, pushed)
 
-        parts = in_parallel(part, self._pieces)
-        return sum(energy for energy, _, _ in parts), _collected(
-            [(first, pushed) for _, first, pushed in parts], control
-        )
+        rows, energies, pushed = zip(*in_parallel(part, self._pieces), strict=True) if self._pieces else ((), (), ())
+        if _EVALUATIONS * sum(found.rows.nbytes for found in rows) < _MOST_KEPT:
+            self._kept.append((control.copy(), list(rows)))
+        return sum(energies), _collected(list(pushed), control)
 
     def curvature(self, control: Array) -> PiecewiseOperator:
         """Return the Gauss-Newton part of the second derivative at `control`, as an operator in single precision.
 
-        The rows of the operator are kept in memory while they take less than `_MOST_KEPT`, because the rows of a map
-        that folds nearly everywhere would take gigabytes. Otherwise they are computed again for each product, with the
-        same result.
+        Where the penalty was evaluated lately, its rows are known. The rows of the operator are kept in memory while
+        they take less than `_MOST_KEPT`, because the rows of a map that folds nearly everywhere would take gigabytes.
+        Otherwise they are computed again for each product, with the same result.
         """
+        known = next((rows for place, rows in self._kept if np.array_equal(place, control)), None)
         taken = 0.0
 
-        def piece(spans: _PenaltySpans) -> tuple[Callable[[Floats], _Windows], _Windows] | None:
+        def rows_of(number: int) -> _Rows:
+            found = self._short_rows(control, self._pieces[number]) if known is None else known[number]
+            return found.in_control_points()
+
+        def piece(number: int) -> tuple[Callable[[Floats], _Windows], _Windows] | None:
             nonlocal taken
-            found = self._short_rows(control, spans, np.float32).in_control_points()
+            found = rows_of(number)
             if not len(found.rows):
                 return None
             own = found.spans.first, _blocks(found.rows, found.starts, 2.0 * found.shares)
             taken += found.rows.nbytes
             if taken <= _MOST_KEPT:
                 return found.squared, own
-            return lambda x: self._short_rows(control, spans, np.float32).in_control_points().squared(x), own
+            return lambda x: rows_of(number).squared(x), own
 
-        found = [one for one in in_parallel(piece, self._pieces) if one is not None]
+        found = [one for one in in_parallel(piece, range(len(self._pieces))) if one is not None]
         blocks = [own for _, own in found]
         return PiecewiseOperator(
             [product for product, _ in found], _collected, lambda like: _collected(blocks, no_blocks(like))
         )
 
-    def _short_rows(self, control: Array, spans: _PenaltySpans, dtype: type[np.floating] = np.float64) -> _Rows:
+    def _short_rows(self, control: Array, spans: _PenaltySpans) -> _Rows:
         """Return the rows of the coefficients that lie below the floor on some spans."""
         points = _bezier_points(control, spans.first, spans.weights)
         points = points.reshape(len(points), 3, *spans.weights.shape[2:], spans.weights.shape[2])
@@ -171,13 +185,12 @@ class BlockDeterminants:
         unscaled = self._unscale / spans.volumes[:, None, None, None]
         short = spans.floors[:, None, None, None] - np.moveaxis(determinant[..., chosen], -1, 0) * unscaled
         place = np.ascontiguousarray(np.argwhere(short > 0.0))  # (r, 4): span and coefficient, span by span
-        rows = np.zeros((len(place), 3, *bezier.shape[1:4]), dtype=dtype)
+        rows = np.zeros((len(place), 3, *bezier.shape[1:4]))
         crosses = cross[..., chosen], cross_products(nets[2], nets[0]), cross_products(nets[0], nets[1])
         for direction, (other, scale) in enumerate(zip(crosses, self._scales, strict=True)):
             _add_derivatives(place, other, scale, unscaled, direction, rows)
         starts = np.concatenate([[0], np.cumsum(np.bincount(place[:, 0], minlength=len(short)))])
-        shares = spans.shares[place[:, 0]].astype(dtype)
-        return _Rows(spans, short[tuple(place.T)], shares, rows, starts)
+        return _Rows(spans, short[tuple(place.T)], spans.shares[place[:, 0]], rows, starts)
 
 
 class DeterminantPenalty(Blockwise[BlockDeterminants]):
