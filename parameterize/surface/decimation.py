@@ -13,6 +13,7 @@ from ..arrays import Array, IntArray
 from .errors import MeshError, check_face_limit
 from .geometry import doubled_areas
 from .groups import renumbered
+from .nearest import distance_to_mesh
 from .surface import Surface, surface_from_arrays
 
 MOST_FITTED = 40_000  # faces: a surface of more is fitted on a copy; below, the copy would hardly be faster
@@ -75,7 +76,8 @@ def _checked(surface: Surface, vertices: Array, faces: IntArray, max_faces: int)
     if len(faces) > max_faces:
         name = surface.source or surface.name
         raise MeshError(f"{name}: cannot be decimated below {len(faces)} faces: raise --max-faces")
-    moved = igl.hausdorff(np.asfortranarray(surface.unit_vertices), surface.faces, vertices, faces) / surface.scale
+    one, other = (surface.unit_vertices, surface.faces), (vertices, faces)
+    moved = max(distance_to_mesh(one[0], *other).max(), distance_to_mesh(other[0], *one).max()) / surface.scale
     smaller = surface_from_arrays(surface.from_unit(vertices), faces, surface.name, max_faces=max_faces)
     smaller = replace(smaller, source=surface.source, unit=surface.unit)
     labelled = surface.groups or surface.brep or len(surface.solids) > 1

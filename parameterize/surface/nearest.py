@@ -1,16 +1,15 @@
 """The nearest points of a triangle mesh."""
 
-import igl
 import numpy as np
 
 from ..arrays import Array, IntArray
 from .geometry import normals_and_areas
-from .solid import Solid
+from .triangle_tree import TriangleTree
 
 
 def distance_to_mesh(points: Array, vertices: Array, faces: IntArray) -> Array:
     """Return the distance of each point (m, 3) to the nearest point of a triangle mesh: (m,)."""
-    return Solid(vertices, faces).depths(points)
+    return np.sqrt(TriangleTree(vertices, faces).nearest(points)[0])
 
 
 def nearest_on_mesh(points: Array, vertices: Array, faces: IntArray) -> tuple[Array, Array]:
@@ -26,14 +25,8 @@ def closest_triangles(points: Array, vertices: Array, faces: IntArray) -> tuple[
 
     The weights belong to the nearest point within its triangle.
     """
-    target = np.ascontiguousarray(vertices, dtype=np.float64)
-    triangles = np.ascontiguousarray(faces, dtype=np.int64)
-    squared, index, foot = igl.point_mesh_squared_distance(
-        np.ascontiguousarray(points, dtype=np.float64), target, triangles
-    )
-    nearest = np.asarray(index, dtype=np.int64).ravel()
-    weights = shares_of(foot, target[triangles[nearest]])
-    return np.sqrt(np.asarray(squared).ravel()), nearest, weights
+    squared, nearest, weights = TriangleTree(vertices, faces).nearest(points)
+    return np.sqrt(squared), nearest, weights
 
 
 def shares_of(points: Array, corners: Array) -> Array:

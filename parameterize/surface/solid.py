@@ -10,6 +10,7 @@ import numpy as np
 
 from ..arrays import Array, IntArray, Mask
 from .geometry import normals_and_areas
+from .triangle_tree import TriangleTree
 
 _ACCURACY = 2.0  # of the fast winding number
 _NUDGES = 1e-5 * np.array([[0.61, -0.32, 0.72], [-0.48, 0.79, 0.38]])  # a ray through an edge or a corner meets nothing
@@ -38,10 +39,15 @@ class Solid:
 
     @cached_property
     def _tree(self) -> Any:
-        """Return the tree of boxes that finds nearest triangles."""
+        """Return the tree of boxes that finds the triangles on rays."""
         tree = igl.AABB()
         tree.init(self._vertices, self._faces)
         return tree
+
+    @cached_property
+    def _triangles(self) -> TriangleTree:
+        """Return the tree that finds nearest triangles."""
+        return TriangleTree(self._vertices, self._faces)
 
     @cached_property
     def _winding(self) -> Any:
@@ -64,8 +70,7 @@ class Solid:
 
     def squared_depths(self, points: Array) -> Array:
         """Return the squared distances (n,) of points (n, 3) from the surface."""
-        squares = self._tree.squared_distance(self._vertices, self._faces, np.ascontiguousarray(points))[0]
-        return np.asarray(squares).ravel()
+        return self._triangles.nearest(points)[0]
 
     def signed_distances(self, points: Array) -> Array:
         """Return the distances (n,) of points (n, 3) from the surface, negative inside, to some thousandths."""
