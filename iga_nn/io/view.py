@@ -38,7 +38,7 @@ from ..errors import InputError, one_line
 from ..figures.fields import OnGrid, arap_of, error_at, known_groups, problems_on
 from .cell_regions import enter_regions
 from .elements import Cuts
-from .vtk import bezier_cells, enter_owners, save
+from .vtk import bezier_cells, enter, enter_owners, hexahedra, save
 
 if TYPE_CHECKING:
     import pyvista
@@ -126,7 +126,9 @@ def _viewed(
         u, v, w = rows
         cuts |= dict.fromkeys(part.numbers.tolist(), (u, v, w))
         lattices.append(_sampled(part, rows, _of_map(part, rows) | _of(part, rows, quantities)))
-    return _joined(body, lattices), cuts
+    import pyvista
+
+    return pyvista.wrap(_joined(body, lattices)), cuts
 
 
 def write_series(path: Path, times: Sequence[float], fields: Sequence[FieldOnBody], samples: int | None = None) -> None:
@@ -218,12 +220,8 @@ def _ends(side: int) -> slice:
     return slice(1, None) if side else slice(None, -1)
 
 
-def _joined(
-    body: BodyLike, lattices: Sequence[_Lattice], kind: type[np.floating[Any]] = np.float64
-) -> pyvista.UnstructuredGrid:
-    """Return the samples of all patches as one grid, with the numbers of each cell's patch and solid."""
-    import pyvista
-
+def _joined(body: BodyLike, lattices: Sequence[_Lattice], kind: type[np.floating[Any]] = np.float64) -> Any:
+    """Return the samples of all patches as one grid of VTK, with the numbers of each cell's patch and solid."""
     cells, owners, start = [], [], 0
     for lattice in lattices:
         own = lattice.cells
@@ -231,13 +229,13 @@ def _joined(
         owners.append(np.repeat(lattice.part.numbers, own.shape[1]))
         start += lattice.points.size // 3
     points = np.concatenate([_flat(lattice.points) for lattice in lattices]).astype(kind)
-    grid = pyvista.UnstructuredGrid({pyvista.CellType.HEXAHEDRON: np.concatenate(cells)}, points)
+    grid = hexahedra(points, np.concatenate(cells))
     enter_owners(grid, as_body(body), np.concatenate(owners))
     for name in lattices[0].fields:
         columns, components = _as_columns(np.concatenate([_flat(lattice.fields[name]) for lattice in lattices]))
-        grid.point_data[name] = columns.astype(kind)
+        entered = enter(grid.GetPointData(), name, columns.astype(kind))
         for number, component in enumerate(components):
-            grid.GetPointData().GetArray(name).SetComponentName(number, component)
+            entered.SetComponentName(number, component)
     return grid
 
 

@@ -119,12 +119,38 @@ def bezier_cells(body: BodyLike, solution: FieldOnBody | None) -> pyvista.Unstru
     return grid
 
 
-def enter_owners(grid: pyvista.UnstructuredGrid, body: Body, owners: IntArray) -> None:
+def hexahedra(points: Array, cells: IntArray) -> Any:
+    """Return linear hexahedra (k, 8) on points (n, 3) as a grid of VTK itself: pyvista takes longer to load."""
+    from vtkmodules.util.numpy_support import numpy_to_vtk
+    from vtkmodules.vtkCommonCore import vtkPoints
+    from vtkmodules.vtkCommonDataModel import VTK_HEXAHEDRON, vtkCellArray, vtkUnstructuredGrid
+
+    places, rows, grid = vtkPoints(), vtkCellArray(), vtkUnstructuredGrid()
+    places.SetData(numpy_to_vtk(points, deep=True))
+    rows.SetData(cells.shape[1], numpy_to_vtk(cells.ravel(), deep=True))
+    grid.SetPoints(places)
+    grid.SetCells(VTK_HEXAHEDRON, rows)
+    return grid
+
+
+def enter(data: Any, name: str, values: NDArray[Any]) -> Any:
+    """Enter an array (n,) or (n, k) into the point or cell data of a grid of VTK and return it; the first is shown."""
+    from vtkmodules.util.numpy_support import numpy_to_vtk
+
+    array = numpy_to_vtk(np.ascontiguousarray(values), deep=True)
+    array.SetName(name)
+    data.AddArray(array)
+    if data.GetScalars() is None:
+        data.SetActiveScalars(name)
+    return array
+
+
+def enter_owners(grid: Any, body: Body, owners: IntArray) -> None:
     """Enter the numbers of the cells' patches (cells,) and solids, where the body has several, as cell data."""
     if not body.is_single:
-        grid.cell_data["patch"] = owners
+        enter(grid.GetCellData(), "patch", owners)
     if body.solids.are_several:
-        grid.cell_data["solid"] = body.solids.numbers[owners]
+        enter(grid.GetCellData(), "solid", body.solids.numbers[owners])
 
 
 def _entered(values: Sequence[Array], labels: Sequence[IntArray], count: int) -> Array:

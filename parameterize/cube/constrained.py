@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from itertools import combinations, product
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
 
 from ..arrays import Array, IntArray, Mask
 from ..surface.geometry import edge_table
@@ -28,6 +27,8 @@ def choose_sharp_corners(layout: CubeLayout, ridges: Ridges, off_ridge: float = 
     A vertex elsewhere on a ridge, and more so one off all ridges, by `off_ridge`, has to be nearer. Then corners move
     to others of sharp edges, one by one or two at a time, where edges of the cube follow more ridges.
     """
+    from scipy.optimize import linear_sum_assignment
+
     gaps = np.linalg.norm(layout.places[:, None] - CORNERS, axis=2)  # (n, 8)
     on = np.flatnonzero(ridges.hold(layout.points))
     ends = np.array([np.linalg.norm(layout.points - corner, axis=1).argmin() for corner in ridges.corners], dtype=int)

@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
 from scipy.sparse import coo_array, csr_array, eye_array
 from scipy.sparse.csgraph import dijkstra
 from scipy.sparse.linalg import splu
@@ -47,6 +46,8 @@ class CubeSurface:
 
 def choose_corners(mapped: Array) -> IntArray:
     """Return eight different vertices (8,), the farthest towards each corner P of the cube: argmax <v - A, P - A>."""
+    from scipy.optimize import linear_sum_assignment
+
     reach = (mapped - 0.5) @ (CORNERS - 0.5).T  # (n, 8)
     candidates = np.unique(np.argsort(-reach, axis=0)[:8])
     rows, columns = linear_sum_assignment(-reach[candidates])

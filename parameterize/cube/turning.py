@@ -6,7 +6,6 @@ edge in a hollow cannot lie on the surface; an edge along a ridge suits best.
 
 import numba
 import numpy as np
-from scipy.optimize import fmin
 from scipy.spatial.transform import Rotation
 
 from ..arrays import Array
@@ -31,6 +30,8 @@ def best_turn(layout: CubeLayout, generator: np.random.Generator, number: int = 
     the simplex method of Nelder and Mead; results that nearly agree count as one. Where fewer than `number` + 1 results
     are left, the list continues with the best random rotations that differ from all results.
     """
+    from scipy.optimize import fmin
+
     middles, along, bends = _bends(layout)
     simplex = _FIRST_TURN * np.vstack([np.zeros(3), np.eye(3)])
 

@@ -5,7 +5,6 @@ from collections.abc import Callable
 
 import numba
 import numpy as np
-from scipy.ndimage import uniform_filter
 
 from ..arrays import Array, Floats, Knots
 from ..quality.rotations import closest_rotations, cofactors_and_determinants, least_eigenvalues, squared_norms
@@ -60,6 +59,7 @@ class BlockDistortion:
         usual alpha would inflate such a part, against the surface's data. There alpha is half the mean of det J in a
         neighbourhood, which is a ninth of the cube wide.
         """
+        from scipy.ndimage import uniform_filter
 
         def part(planes: slice) -> Array:
             return np.asarray(cofactors_and_determinants(self._grid.jacobian(control, planes))[1])

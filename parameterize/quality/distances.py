@@ -21,6 +21,7 @@ from ..surface.nearest import closest_triangles, distance_to_mesh
 
 _NEWTON_STEPS = 5
 _DAMPING = 1e-12  # tangents may be parallel at an edge of the cube
+_ROUNDING = 1e-15  # of the largest coordinate: points that are so close come no closer
 _CONVERGED = 1e-3  # a step that gains less than this share of the distance is the last
 
 
@@ -86,9 +87,12 @@ def closest_in_faces(points: Array, body: Body, patches: IntArray, start: Array,
     patches: (m,), of each point. axis: (m,), the direction that is constant on the cube face of each start. Parameters
     stay on that face.
     """
-    where, active = start.copy(), np.arange(len(points))
+    where = start.copy()
     best: Array = np.linalg.norm(body.points(patches, where) - points, axis=1)
+    active = np.flatnonzero(best > _ROUNDING * np.abs(points).max(initial=0.0))
     for _ in range(_NEWTON_STEPS):
+        if not active.size:
+            break
         trial, (a, b), rows = where[active], tangent_axes(axis[active]), np.arange(len(active))
         jacobian = body.jacobian(patches[active], trial)  # (k, 3, 3)
         right = points[active] - body.points(patches[active], trial)
@@ -101,8 +105,6 @@ def closest_in_faces(points: Array, body: Body, patches: IntArray, start: Array,
         closer = gain > 0.0
         where[active[closer]], best[active[closer]] = trial[closer], distance[closer]
         active = active[gain > _CONVERGED * best[active]]
-        if not active.size:
-            break
     return where, best
 
 

@@ -243,11 +243,10 @@ def evaluate_at(
 
     coefficients: (n_u, n_v, n_w) or (n_u, n_v, n_w, c); returns (m,) or (m, c).
     """
-    from scipy.interpolate import NdBSpline
-
-    where = checked_parameters(points)
-    spline = NdBSpline(tuple(knots), coefficients, tuple(degrees))
-    return np.asarray(spline(where, nu=tuple(derivative)))
+    net = np.ascontiguousarray(coefficients).reshape(1, *coefficients.shape[:3], -1)
+    only = np.zeros(len(np.atleast_2d(points)), dtype=np.int64)
+    values = evaluate_each(degrees, knots, net, only, points, derivative)
+    return values.reshape(len(values), *coefficients.shape[3:])
 
 
 def checked_parameters(points: ArrayLike) -> Array:

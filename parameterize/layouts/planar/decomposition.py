@@ -8,7 +8,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.optimize import Bounds, LinearConstraint, milp
 from scipy.sparse import csr_array
 
 from ...arrays import Array
@@ -142,6 +141,8 @@ def _chosen(
                 for owner, way in sides:
                     equations.setdefault((owner, *(a, b)[::way]), {})[column] = -1.0
                 column += 1
+    from scipy.optimize import Bounds, LinearConstraint, milp
+
     cost = np.concatenate([*costs, np.zeros(column - first)])
     keys = list(equations)
     data = [(i, j, v) for i, key in enumerate(keys) for j, v in equations[key].items()]

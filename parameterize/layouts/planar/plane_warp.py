@@ -3,9 +3,9 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
-from scipy.interpolate import RBFInterpolator
 from scipy.spatial import cKDTree
 
 from ...arrays import Array
@@ -51,8 +51,10 @@ class PlaneWarp:
         return bool(np.abs(self.places - self.lines).max() <= 8.0 * self.near)
 
     @cached_property
-    def _smooth(self) -> RBFInterpolator:
+    def _smooth(self) -> Any:
         """Return the displacement as a thin plate spline through points of all lines."""
+        from scipy.interpolate import RBFInterpolator
+
         apart = max(_APART * float(np.ptp(self.lines, axis=(0, 1)).max()), self._total / _MOST)
         points, away = [], []
         for line, place in zip(self.lines, self.places, strict=True):

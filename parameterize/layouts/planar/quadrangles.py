@@ -14,9 +14,8 @@ from dataclasses import dataclass
 from itertools import combinations, islice
 
 import numpy as np
-from scipy.optimize import Bounds, LinearConstraint, milp
 
-from ...arrays import Array
+from ...arrays import Array, IntArray
 from ...surface.triangulation import triangulate
 from .polygons import cross, edges_of
 
@@ -183,12 +182,19 @@ def _matched(points: Array, triangles: list[Triangle]) -> tuple[list[tuple[int, 
     for k, (one, other, _, _) in enumerate(pairs):
         uses[[one, other], k] = 1.0
     gains = np.array([len(triangles) + sine for *_, sine in pairs])
-    once, whole = LinearConstraint(uses, ub=1.0), np.ones(len(pairs), dtype=np.int64)
-    chosen = milp(-gains, integrality=whole, bounds=Bounds(0.0, 1.0), constraints=once).x
-    assert chosen is not None  # no pair at all is allowed, too
-    taken = np.flatnonzero(chosen > 0.5)
+    taken = _best_pairs(uses, gains) if uses.sum(axis=1).max() > 1.0 else np.arange(len(pairs))
     left = np.flatnonzero(uses[:, taken].sum(axis=1) < 0.5)
     return [pairs[k][2] for k in taken], [triangles[k] for k in left]
+
+
+def _best_pairs(uses: Array, gains: Array) -> IntArray:
+    """Return the numbers of the pairs with the largest sum of gains (k,), uses (triangles, k), each triangle in one."""
+    from scipy.optimize import Bounds, LinearConstraint, milp  # which takes longer to load than a box needs for all
+
+    once, whole = LinearConstraint(uses, ub=1.0), np.ones(len(gains), dtype=np.int64)
+    chosen = milp(-gains, integrality=whole, bounds=Bounds(0.0, 1.0), constraints=once).x
+    assert chosen is not None  # no pair at all is allowed, too
+    return np.flatnonzero(chosen > 0.5)
 
 
 def _all_divided(points: Array, pieces: list[tuple[int, ...]], border: set[tuple[int, int]]) -> Quadrangles:

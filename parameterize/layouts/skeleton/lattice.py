@@ -9,7 +9,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import ndimage
 
 from ...arrays import Array, Floats, IntArray, Mask
 from ...surface.solid import Solid, crossed_pairs, inside_of
@@ -91,6 +90,7 @@ def _parted(inside: Mask, corners: Array, vertices: Array, faces: IntArray) -> M
 
 def _in_one_piece(inside: Mask, low: Array, cell: float) -> Lattice:
     """Return the largest piece, its cavities filled."""
+    from scipy import ndimage
     from skimage.measure import euler_number
 
     labels, count = ndimage.label(inside, _ALL_NEIGHBOURS)
@@ -108,12 +108,16 @@ class Depth:
 
     def __init__(self, inside: Mask) -> None:
         """Compute the distance of each point inside, (n_x, n_y, n_z), from the nearest point outside."""
+        from scipy.ndimage import distance_transform_edt
+
         self.inside = inside
-        self.values: Array = ndimage.distance_transform_edt(inside) - _TO_SURFACE * inside
+        self.values: Array = distance_transform_edt(inside) - _TO_SURFACE * inside
 
     def at(self, points: Array) -> Array:
         """Return the distance (k,) at points (k, 3), by trilinear interpolation."""
-        return np.asarray(ndimage.map_coordinates(self.values, points.T, order=1))
+        from scipy.ndimage import map_coordinates
+
+        return np.asarray(map_coordinates(self.values, points.T, order=1))
 
     def uphill(self, points: Array) -> Array:
         """Return the direction (k, 3) in which the distance grows at points (k, 3), as long as its rate."""

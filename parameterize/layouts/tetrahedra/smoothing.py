@@ -10,7 +10,6 @@ from functools import cache
 
 import numba
 import numpy as np
-from scipy.optimize import minimize
 
 from ...arrays import Array, IntArray, Mask
 from .determinant import indices
@@ -41,6 +40,7 @@ class CubicDistortion:
 
     def smoothed(self, nodes: Array, width: float) -> Array:
         """Return nodes (k, 3) of which the free ones have moved to less distortion, with a floor of this width."""
+        from scipy.optimize import minimize
 
         def value(free: Array) -> tuple[float, Array]:
             moved = nodes.copy()
