@@ -11,17 +11,20 @@ so that no step turns a triangle over.
 import math
 import time
 from collections.abc import Callable, Iterator
+from functools import cached_property
+from typing import Any, Literal
 
 import igl
 import numpy as np
 from scipy.sparse import coo_array, csc_array, csr_array, diags_array, eye_array
 from scipy.sparse.csgraph import dijkstra
-from scipy.sparse.linalg import eigsh, splu
+from scipy.sparse.linalg import SuperLU, eigsh, splu
 
 from ..arrays import Array, IntArray, Mask
 from ..checkpoint import Checkpoints
 from ..progress import Progress, ProgressCallback, ignore
 from ..surface.geometry import edge_table, normals_and_areas
+from ..threads import in_parallel
 from .cube import CubeLayout
 from .cutting import split_edges
 
@@ -42,7 +45,11 @@ _STEPS = 300  # Newton steps, at most
 _CHECKPOINT, _CHECKPOINT_SECONDS = "sphere", 5.0
 _DAMPING = 1e-8  # of a Newton step, as a share of the mean diagonal entry
 _LEAST_GAIN = 1e-3  # share of the energy: the steps end once one of them gains less
+_LONGER = (
+    1.5  # factor of a whole step, again and again, while the energy falls: of tiny triangles it falls by half a step
+)
 _SHORTEST_STEP = 1e-10  # share of a Newton step
+_PIECE = 1024  # triangles whose derivatives one thread computes at once
 _ARMIJO = 1e-4  # share of the decrease that the slope promises which a step must reach
 
 
@@ -146,7 +153,7 @@ def _hemispheres(vertices: Array, faces: IntArray, upper: Mask, weigh: _Weigh) -
         pulls = weigh(straight, left, nearer), weigh(straight, left, ~nearer)
         links = _links(edges, np.concatenate(pulls), len(vertices))
         matrix = csc_array(_laplacian(links)[inner][:, inner])
-        flat[inner] = _solved(matrix, links[inner][:, rim] @ flat[rim])
+        flat[inner] = _factors(matrix, "MMD_AT_PLUS_A").solve(links[inner][:, rim] @ flat[rim])
         square = (flat[used] ** 2).sum(axis=1, keepdims=True)  # stereographic
         directions[used] = np.hstack([2.0 * flat[used], side * (1.0 - square)]) / (1.0 + square)
     return directions
@@ -172,10 +179,9 @@ def _laplacian(links: csr_array) -> csr_array:
     return csr_array(diags_array(links.sum(axis=1)) - links)
 
 
-def _solved(matrix: csc_array, right: Array) -> Array:
-    """Return the solution for a matrix that needs no pivots: positive definite, or diagonally dominant."""
-    factors = splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
-    return np.asarray(factors.solve(right))
+def _factors(matrix: csc_array, order: Literal["MMD_AT_PLUS_A", "NATURAL"]) -> SuperLU[Any]:
+    """Return the factors of a matrix that needs no pivots: positive definite, or diagonally dominant."""
+    return splu(matrix, permc_spec=order, diag_pivot_thresh=0.0, options={"SymmetricMode": True})
 
 
 def _volumes(corners: Array) -> Array:
@@ -220,40 +226,24 @@ class _Triangles:
 
     def derivatives(self, directions: Array, tangents: Array) -> tuple[Array, Array]:
         """Return the gradient (m, 6) and a positive second derivative (m, 6, 6) in steps along tangents (n, 3, 2)."""
-        corners, count = directions[self.faces], len(self.faces)
-        area = 0.5 * _volumes(corners)[:, None, None]
-        sides = corners - corners[:, :1]
-        towards = 2.0 * self._stiffness @ sides  # derivative of the Dirichlet energy (m, 3, 3)
-        dirichlet = 0.5 * (towards * sides).sum(axis=(1, 2))[:, None, None]
-        wider = 0.5 * np.cross(corners[:, [1, 2, 0]], corners[:, [2, 0, 1]])  # derivative of the area (m, 3, 3)
-        square = self._area[:, None, None] ** 2
-        factor, slope, bend = 1.0 + square / area**2, -2.0 * square / area**3, 6.0 * square / area**4
-        gradient = factor * towards + slope * dirichlet * wider
-        frames = tangents[self.faces]  # (m, 3, 3, 2)
-        first, second = (np.einsum("mic,mica->mia", x, frames).reshape(count, 6) for x in (towards, wider))
-        mixed = first[:, :, None] * second[:, None, :]
-        hessian = slope * (mixed + np.swapaxes(mixed, 1, 2))
-        hessian += bend * dirichlet * second[:, :, None] * second[:, None, :]
-        blocks = 2.0 * factor[..., None, None] * self._stiffness[..., None, None] * np.eye(3)
-        blocks = blocks + (slope * dirichlet)[..., None, None] * _area_bends(corners)
-        hessian += np.einsum("mica,mijcd,mjdb->miajb", frames, blocks, frames).reshape(count, 6, 6)
-        inwards = np.repeat((gradient * corners).sum(axis=2), 2, axis=1)  # the sphere is curved
-        hessian -= inwards[:, :, None] * np.eye(6)
-        values, vectors = np.linalg.eigh(hessian)
-        positive = (vectors * np.maximum(values, 0.0)[:, None]) @ np.swapaxes(vectors, 1, 2)
-        return np.einsum("mic,mica->mia", gradient, frames).reshape(count, 6), positive
+        from .sphere_kernels import derivatives, lift
 
+        def piece(rows: slice) -> tuple[Array, Array]:
+            mine = self.faces[rows], self._stiffness[rows], self._area[rows]
+            gradients, hessians = derivatives(directions, tangents, *mine)
+            lift(hessians, *np.linalg.eigh(hessians))
+            return gradients, hessians
 
-def _area_bends(corners: Array) -> Array:
-    """Return the second derivatives (m, 3, 3, 3, 3) of half the determinant of the corners (m, 3, 3) of triangles."""
-    bends = np.zeros((len(corners), 3, 3, 3, 3))
-    for i in range(3):
-        j, k = (i + 1) % 3, (i + 2) % 3
-        x, y, z = 0.5 * corners[:, k].T
-        none = np.zeros_like(x)
-        turn = np.stack([none, z, -y, -z, none, x, y, -x, none], axis=1).reshape(-1, 3, 3)  # of x_i . (x_j x x_k)
-        bends[:, i, j], bends[:, j, i] = turn, np.swapaxes(turn, 1, 2)
-    return bends
+        rows = [slice(start, start + _PIECE) for start in range(0, len(self.faces), _PIECE)]
+        gradients, hessians = zip(*in_parallel(piece, rows), strict=True)
+        return np.concatenate(gradients), np.concatenate(hessians)
+
+    @cached_property
+    def rank(self) -> IntArray:
+        """Return the place (n,) of each point in an order of elimination that fills in little."""
+        links = _links(edge_table(self.faces)[0], np.ones(1), int(self.faces.max()) + 1)
+        pattern = csc_array(_laplacian(links) + eye_array(links.shape[0]))
+        return np.asarray(_factors(pattern, "MMD_AT_PLUS_A").perm_c, dtype=np.int64)
 
 
 def _relaxed(
@@ -265,9 +255,9 @@ def _relaxed(
 ) -> Array:
     """Return directions of lower energy by Newton steps, which are shortened until no triangle turns over.
 
-    A step is also shortened until the energy falls. Directions with triangles too small for double precision are
-    returned unchanged. done: the number of steps that have led to the directions. keep: a function that keeps
-    directions and this number for a run that resumes.
+    A step is also shortened until the energy falls, and lengthened while it falls further. Directions with triangles
+    too small for double precision are returned unchanged. done: the number of steps that have led to the directions.
+    keep: a function that keeps directions and this number for a run that resumes.
     """
     energy = triangles.energy(directions)
     if not math.isfinite(energy):
@@ -291,7 +281,7 @@ def _relaxed(
 
 def _stepped(directions: Array, energy: float, triangles: _Triangles) -> tuple[Array, float] | None:
     """Return the directions after a Newton step, and their energy; None where it does not fall."""
-    unknowns = (2 * triangles.faces[:, :, None] + np.arange(2)).reshape(-1, 6)
+    unknowns = (2 * triangles.rank[triangles.faces][:, :, None] + np.arange(2)).reshape(-1, 6)
     rows, columns = np.repeat(unknowns, 6, axis=1).ravel(), np.tile(unknowns, (1, 6)).ravel()
     size = 2 * len(directions)
     tangents = _tangents(directions)
@@ -299,16 +289,23 @@ def _stepped(directions: Array, energy: float, triangles: _Triangles) -> tuple[A
     slope = np.asarray(np.bincount(unknowns.ravel(), slopes.ravel(), size), dtype=np.float64)
     matrix = coo_array((hessians.ravel(), (rows, columns)), shape=(size, size)).tocsc()
     damping = _DAMPING * matrix.diagonal().mean()
-    step = _solved(csc_array(matrix + damping * eye_array(size)), -slope)
-    move, length = np.einsum("nca,na->nc", tangents, step.reshape(-1, 2)), 1.0
-    while length > _SHORTEST_STEP:
+    step = _factors(csc_array(matrix + damping * eye_array(size)), "NATURAL").solve(-slope)
+    move, length = np.einsum("nca,na->nc", tangents, step.reshape(-1, 2)[triangles.rank]), 1.0
+
+    def moved(length: float) -> tuple[Array, float]:
         trial = directions + length * move
         trial /= np.linalg.norm(trial, axis=1, keepdims=True)
-        lower = triangles.energy(trial)
-        if lower <= energy + _ARMIJO * length * float(slope @ step):
-            return trial, lower
+        return trial, triangles.energy(trial)
+
+    found = moved(length)
+    while found[1] > energy + _ARMIJO * length * float(slope @ step):
         length *= 0.5
-    return None
+        if length < _SHORTEST_STEP:
+            return None
+        found = moved(length)
+    while length >= 1.0 and (further := moved(_LONGER * length))[1] < found[1]:
+        found, length = further, _LONGER * length
+    return found
 
 
 def _tangents(directions: Array) -> Array:
