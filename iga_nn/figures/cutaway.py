@@ -12,11 +12,10 @@ from matplotlib.colors import to_rgba_array
 from parameterize.arrays import Array, IntArray, Mask
 from parameterize.spline.body import Body, BodyLike, as_body
 from parameterize.spline.interface_rows import kinds
-from parameterize.spline.orientation import orientation
 from parameterize.spline.volume import AXES, FACE_NAMES
 
 from .colors import face_colors
-from .fields import PER_PATCH, ColoredField, Samples, outer_faces
+from .fields import PER_PATCH, ColoredField, Samples, hand_of, outer_faces
 from .outline import is_by_face, smooth_colors
 from .render import TILT, Patch, View, widest_view
 
@@ -74,7 +73,7 @@ def cut_of(body: BodyLike, drawn: Samples, points: Samples, view: View | None = 
     """
     glued, outer = as_body(body), drawn.on(outer_faces(body))
     if glued.is_single:
-        octant, best = best_cut(outer, orientation(glued.only))
+        octant, best = best_cut(outer, hand_of(body))
         return only(octant), best
     view = view or widest_view(outer.reshape(-1, 3), TILT)
     return beyond(points, view.towards) & beyond(points, view.up), view

@@ -10,11 +10,11 @@ the patch, and the number among the nine.
 """
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, partial, wraps
 from operator import itemgetter
-from typing import Any, Self, TypeVar
+from typing import Any, Self, TypeVar, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -22,7 +22,7 @@ from numpy.typing import ArrayLike
 from parameterize.arrays import Array, IntArray
 from parameterize.quality.distortion import in_boxes, own_boxes, unmirrored
 from parameterize.spline.body import BodyLike, as_body
-from parameterize.spline.orientation import orientations
+from parameterize.spline.orientation import orientation, orientations
 from parameterize.spline.patch_groups import PatchGroup
 from parameterize.spline.spline_stack import SplineStack
 from parameterize.spline.volume import AXES, BSplineVolume
@@ -43,6 +43,7 @@ Grid = tuple[Array, Array, Array]  # parameters of a tensor grid; on a face or a
 OnGrid = Callable[[IntArray, Array, Array, Array], Array]  # takes some patches of a group and a tensor grid
 Parts = Sequence[tuple[IntArray, OnGrid]]  # groups: the numbers of the patches, and (k, n_u, n_v, n_w, ...) on some
 Result = TypeVar("Result")
+Found = list[tuple[str, tuple[Any, ...], Any]]  # name of a function that remembers, what it was given, its result
 
 SECTIONS = tuple(f"{axis} = 1/2" for axis in AXES)
 PLANES = [(axis, side) for axis in range(3) for side in (0.0, 1.0)] + [(axis, 0.5) for axis in range(3)]
@@ -56,6 +57,8 @@ OF_MANY = {150: (25, 11), 1000: (17, 5), 7400: (9, 3), math.inf: (5, 2)}  # of e
 LINED = 10_000  # patches: of more, borders would cover the colours
 NAMED = 300  # outer faces whose names can be read in a picture
 KEPT = 2  # results of one function
+SAMPLED = "points_of", "hand_of", "distortion_of", "vectors_of", "solution_of", "fields_of", "error_of"  # by functions
+_REMEMBERED: dict[str, list[tuple[tuple[Any, ...], Any]]] = {}
 
 DISTORTION = "distortion"  # the name of a field that has no unit
 STRESS = "von Mises"  # the name of the field that a body is drawn in
@@ -170,18 +173,36 @@ class ColoredField(Samples):
 
 def remembered(function: Callable[..., Result]) -> Callable[..., Result]:
     """Return a function that finds its last results again for the same objects, so that all pictures share samples."""
-    kept: list[tuple[tuple[Any, ...], Result]] = []
+    kept = _REMEMBERED[function.__name__] = list[tuple[tuple[Any, ...], Any]]()
 
     @wraps(function)
     def found(*given: Any) -> Result:
         for known, result in kept:
             if all(old is new for old, new in zip(known, given, strict=True)):
-                return result
+                return cast(Result, result)
         kept.append((given, function(*given)))
         del kept[:-KEPT]
-        return kept[-1][1]
+        return cast(Result, kept[-1][1])
 
     return found
+
+
+def found_of(objects: Collection[object]) -> Found:
+    """Return the samples that are remembered of these objects alone, for `recall` in another process."""
+    numbers = {id(one) for one in objects}
+    return [
+        (name, given, result)
+        for name in SAMPLED
+        for given, result in _REMEMBERED[name]
+        if numbers.issuperset(map(id, given))
+    ]
+
+
+def recall(found: Found) -> None:
+    """Remember what another process has found of objects that came with it."""
+    for name, given, result in found:
+        _REMEMBERED[name].append((given, result))
+        del _REMEMBERED[name][:-KEPT]
 
 
 def sampled(body: BodyLike, parts: Parts) -> Samples:
@@ -232,6 +253,12 @@ def _in_order(parts: Sequence[tuple[IntArray, Array]], count: int) -> Array:
 def points_of(body: BodyLike) -> Samples:
     """Return the points (..., 3) of a body."""
     return sampled(body, maps_of(body))
+
+
+@remembered
+def hand_of(body: BodyLike) -> int:
+    """Return the orientation of a volume, 1 or -1."""
+    return orientation(as_body(body).only)
 
 
 def maps_of(body: BodyLike) -> Parts:

@@ -3,15 +3,18 @@
 import logging
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
+
+from parameterize.spline.body import as_body
 
 from ..errors import one_line
 from ..report.artifacts import ARTIFACTS, Part
 
 log = logging.getLogger(__name__)
 
+Found = list[tuple[str, tuple[Any, ...], Any]]  # as in figures.fields
 Failures = dict[str, str]  # of figures: what was to be drawn, and the reason why it is not
 
 
@@ -20,12 +23,31 @@ class Figures:
     """Describe figures to draw: those of a part of a run for which the values `known` suffice.
 
     known: values by their names in the table of artifacts. vector: whether plots of curves are also written as PDF.
+    found: samples of these values for a process that has none, see `sampled`.
     """
 
     folder: Path
     part: Part
     known: dict[str, Any]
     vector: bool = False
+    found: Found = field(default_factory=list)
+
+
+def sampled(figures: Figures) -> Figures:
+    """Return figures with the samples that they are drawn of, which the view in the page takes, too."""
+    from ..figures import fields
+
+    known = figures.known
+    if (body := known.get("volume")) is not None:
+        fields.points_of(body)
+        fields.distortion_of(body)
+        if as_body(body).is_single:
+            fields.hand_of(body)
+    if (solution := known.get("solution")) is not None:
+        fields.fields_of(solution)
+        if (problem := known.get("problem")) is not None:
+            fields.error_of(body, solution, problem)
+    return replace(figures, found=fields.found_of(known.values()))
 
 
 def draw(figures: Figures, can_draw: Callable[[], bool] | None = None) -> Failures:
@@ -35,8 +57,9 @@ def draw(figures: Figures, can_draw: Callable[[], bool] | None = None) -> Failur
     """
     failures: Failures = {}
     with drawing("figures", failures):
-        from ..figures import render
+        from ..figures import fields, render
 
+        fields.recall(figures.found)
         for figure in ARTIFACTS:
             if not figure.draw or figure.part != figures.part or not figures.known.keys() >= set(figure.takes):
                 continue
