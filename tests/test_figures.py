@@ -13,7 +13,7 @@ from matplotlib.image import imread
 
 import solve
 from iga_nn.cli.commands import main
-from iga_nn.figures import colors, fields, line_plots
+from iga_nn.figures import colors, fields, line_plots, palette
 from iga_nn.figures import cutaway as octant
 from iga_nn.figures import map as map_figures
 from iga_nn.figures import render as rendering
@@ -108,7 +108,7 @@ def test_fields_in_figures_have_the_colours_of_the_bar(tmp_path, drawing, small_
     image = imread(tmp_path / "solution.png")[..., :3]
     panels = image[:, : int(0.8 * image.shape[1])].reshape(-1, 3)
     colored = panels[np.ptp(panels, axis=1) > 0.1]
-    table = colormaps[colors.MAP](np.arange(256))[:, :3]
+    table = colormaps[palette.MAP](np.arange(256))[:, :3]
     off = np.array([np.abs(table - pixel).max(axis=1).min() for pixel in colored[::23]])
     assert len(off) > 1000 and np.mean(off < 0.03) > 0.75  # the others lie on lines and at the rim
     assert bar_of(figure).get_ylabel() == "u"

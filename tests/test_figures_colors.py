@@ -5,10 +5,13 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from matplotlib import colormaps
+from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 
 import iga_nn
-from iga_nn.figures.colors import even_range, joint_range, range_of_most
+from iga_nn.figures import palette
+from iga_nn.figures.colors import ColorRange, even_range, joint_range, range_of_most
 from iga_nn.figures.fields import fields_of
 from iga_nn.figures.style import color_bar
 from iga_nn.report.viewer import scene_of
@@ -73,3 +76,13 @@ def test_stress_is_coloured_as_it_is_outside_of_singular_places(support):
         assert scene.shown[1] == limits.high == pytest.approx(1.0, abs=0.05)
         assert scene.said.startswith("99 % of the body away from singular places; largest")
     assert not any(field.limits.without for field in fields_of(solution)[1:])  # displacements are finite everywhere
+
+
+def test_the_palette_and_the_shares_are_those_of_matplotlib():
+    assert list(palette.TWENTY) == [to_hex(color) for color in colormaps["tab20"].colors]
+    assert list(palette.TEN) == [to_hex(color) for color in colormaps["tab10"].colors]
+    values = np.geomspace(1e-9, 10.0, 500)
+    for limits in (ColorRange(1e-3, 4.0), ColorRange(1e-6, 1.0, logarithmic=True)):
+        expected = limits.norm()(values)
+        np.testing.assert_allclose(limits.shares(values), expected, atol=1e-15)
+        np.testing.assert_allclose(limits.colors(values), colormaps[palette.MAP](expected)[:, :3], atol=0.002)

@@ -17,7 +17,7 @@ from iga_nn.batch.surfaces import Entry
 from iga_nn.batch.table import Batch, Row
 from iga_nn.batch.table import page as batch_page
 from iga_nn.cli.commands import main
-from iga_nn.figures import colors, fields
+from iga_nn.figures import fields, palette
 from iga_nn.figures.solution import draw_error
 from iga_nn.options import Units
 from iga_nn.report import document
@@ -148,7 +148,7 @@ def test_view_shows_fields_in_the_colours_of_the_bar_and_one_section_at_a_time(i
 
     seen, where, complaints = in_browser(work)
     assert complaints == [] and where == "u = 0.100"
-    table = np.rint(255 * colormaps[colors.MAP](np.arange(256))[:, :3])
+    table = np.rint(255 * colormaps[palette.MAP](np.arange(256))[:, :3])
 
     def share_of(counted, colors):
         """Share of the pixels that have one of these colours, up to rounding."""
@@ -347,7 +347,7 @@ def test_a_plane_of_space_cuts_the_body_in_its_colours(in_browser, tmp_path):
         return (await tab.value(PARTS))["colors"]
 
     seen = in_browser(work)
-    middle = np.rint(255 * np.array(colormaps[colors.MAP](128))[:3])
+    middle = np.rint(255 * np.array(colormaps[palette.MAP](128))[:3])
     near = {name: np.abs(np.array(name.split(","), dtype=float) - middle).max() < 6 for name in seen}
     assert sum(count for name, count in seen.items() if near[name]) > 0.9 * sum(seen.values()) > 1000
 
@@ -382,7 +382,7 @@ def test_element_lines_are_those_of_the_solutions_mesh(in_browser, tmp_path):
 
 def test_a_range_colours_what_lies_outside_by_its_ends(in_browser, solved):
     """u lies between 0 and 0.06."""
-    table = np.rint(255 * colormaps[colors.MAP](np.arange(256))[:, :3])
+    table = np.rint(255 * colormaps[palette.MAP](np.arange(256))[:, :3])
 
     async def work(browser):
         tab, seen = await opened(browser, solved / "report.html"), {}
@@ -491,7 +491,7 @@ def test_the_saved_picture_has_the_view_and_its_bar(in_browser, pulled, tmp_path
     (name, address), height = in_browser(work)
     (tmp_path / name).write_bytes(base64.b64decode(address.removeprefix("data:image/png;base64,")))
     image = np.rint(255 * imread(tmp_path / name)[..., :3])
-    table = np.rint(255 * colormaps[colors.MAP](np.arange(256))[:, :3])
+    table = np.rint(255 * colormaps[palette.MAP](np.arange(256))[:, :3])
     row = image[height + 29]  # through the bar
     assert np.abs(row[60] - table[:20]).max(axis=1).min() <= 2 and np.abs(row[-60] - table[-20:]).max(axis=1).min() <= 2
     assert np.all(image[2, 2] == 255)

@@ -1,9 +1,10 @@
 """Words the answer of a finished command, and chooses its exit code."""
 
-from itertools import zip_longest
-from typing import Any
+from __future__ import annotations
 
-from ..batch.table import Batch
+from itertools import zip_longest
+from typing import TYPE_CHECKING, Any
+
 from ..level_table import ESTIMATES, EXACT_ERRORS, TITLES
 from ..report import advice, asked, balance, extremes
 from ..report import document as reports
@@ -12,6 +13,9 @@ from ..rounding import EXACT, distance, distortion, rounded
 from ..workflow.output_folder import Outcome
 from . import BAD_INPUT, DONE, NOT_CERTIFIED, NOT_SOLVED, NOT_THE_PART
 from .facts import facts_in_words
+
+if TYPE_CHECKING:
+    from ..batch.table import Batch
 
 CODES = {  # of a state
     "certified": DONE,

@@ -6,19 +6,22 @@ Nothing here loads the figures of matplotlib, which take longer than a view is m
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import cycle, islice
+from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib import colormaps
-from matplotlib.colors import LogNorm, Normalize, to_hex, to_rgb
 
 from parameterize.arrays import Array, Mask
 from parameterize.spline.body import BodyLike, as_body
 from parameterize.spline.volume import FACE_NAMES
 
-MAP = "viridis"  # colour map; perceptually uniform
+from .palette import TEN, TWENTY, rgb, shaded
+
+if TYPE_CHECKING:
+    from matplotlib.colors import Normalize
+
 FACE_COLORS = ("#4477aa", "#66ccee", "#228833", "#ccbb44", "#ee6677", "#aa3377")  # also distinct for the colour-blind
-PATCH_COLORS = tuple(to_hex(color) for color in colormaps["tab20"].colors)  # type: ignore[attr-defined]
-REST = "0.82"  # the grey of a surface outside of all regions
+PATCH_COLORS = TWENTY
+REST = "#d1d1d1"  # the grey of a surface outside of all regions
 MOST_NAMED = 31  # patches: of more, too many have the same colour for a legend
 
 DECADES = 1e-4  # lower end of a logarithmic range over the largest error of the best mesh
@@ -62,8 +65,7 @@ def color_labels(body: BodyLike) -> list[tuple[str, str]]:
 
 def region_colors(count: int) -> Array:
     """Return `count` colours, and last the colour of the rest, (count + 1, 3)."""
-    chosen = islice(cycle(colormaps["tab10"].colors), count)  # type: ignore[attr-defined]
-    return np.array([*map(to_rgb, chosen), to_rgb(REST)])
+    return np.array([*map(rgb, islice(cycle(TEN), count)), rgb(REST)])
 
 
 @dataclass(frozen=True)
@@ -109,8 +111,10 @@ class ColorRange:
         where = " away from singular places" if self.without else ""
         return f"{100.0 * SHOWN:g} % of the body{where}; {', '.join(ends)}" if ends else ""
 
-    def norm(self) -> Normalize:
+    def norm(self) -> "Normalize":
         """Return the range as a new object of matplotlib, which maps values to 0..1; colour bars change theirs."""
+        from matplotlib.colors import LogNorm, Normalize
+
         kind = LogNorm if self.logarithmic else Normalize
         return kind(self.low, self.high, clip=True)
 
@@ -118,11 +122,14 @@ class ColorRange:
         """Return the places of values in the range, 0..1; 0.5 where the field has one value."""
         if self.remark:
             return np.full(np.shape(values), 0.5)
-        return np.asarray(self.norm()(np.ravel(values))).reshape(np.shape(values))
+        inside, ends = np.clip(values, self.low, self.high), np.array([self.low, self.high])
+        if self.logarithmic:
+            inside, ends = np.log10(inside), np.log10(ends)
+        return np.asarray((inside - ends[0]) / (ends[1] - ends[0]))
 
     def colors(self, values: Array) -> Array:
         """Return red, green, blue (..., 3) of values (...)."""
-        return np.asarray(colormaps[MAP](self.shares(values)))[..., :3]
+        return shaded(self.shares(values))
 
 
 def _at(place: Sequence[float] | None, length: str | None) -> str:

@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
-from matplotlib.colors import to_rgba_array
 
 from parameterize.arrays import Array, IntArray, Mask
 from parameterize.spline.body import Body, BodyLike, as_body
@@ -17,6 +16,7 @@ from parameterize.spline.volume import AXES, FACE_NAMES
 from .colors import face_colors
 from .fields import PER_PATCH, ColoredField, Samples, hand_of, outer_faces
 from .outline import is_by_face, smooth_colors
+from .palette import rgb
 from .render import TILT, Patch, View, widest_view
 
 Octant = tuple[int, int, int]  # its corner of the cube: the sides, 0 or 1, of u, of v and of w
@@ -57,12 +57,12 @@ def own_colors(body: BodyLike) -> Array:
     Of very many patches the outer faces have a colour between sharp edges, and all inside is light.
     """
     if is_by_face(body):
-        found = np.tile(to_rgba_array(INSIDE)[:, :3], (PER_PATCH * len(as_body(body)), 1))
-        found[outer_faces(body)] = to_rgba_array(smooth_colors(body))[:, :3]
+        found = np.tile(rgb(INSIDE), (PER_PATCH * len(as_body(body)), 1))
+        found[outer_faces(body)] = list(map(rgb, smooth_colors(body)))
         return found
     faces = np.reshape(face_colors(body), (-1, len(FACE_NAMES)))
     named = np.concatenate([faces, np.full((len(faces), len(AXES)), INSIDE)], axis=1)
-    return to_rgba_array(named.ravel())[:, :3]
+    return np.array(list(map(rgb, named.ravel().tolist())))
 
 
 def cut_of(body: BodyLike, drawn: Samples, points: Samples, view: View | None = None) -> tuple[Mask, View]:

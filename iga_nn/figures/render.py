@@ -12,12 +12,12 @@ from types import MappingProxyType
 from typing import Any, Self
 
 import numpy as np
-from matplotlib.colors import to_rgb
 from numpy.typing import NDArray
 
 from parameterize.arrays import Array
 
 from . import probe
+from .palette import rgb
 from .probe import choose_window
 
 log = logging.getLogger(__name__)
@@ -124,8 +124,8 @@ def longest_first(points: Array) -> Array:
 
 
 def plain_patch(points: Array, color: str, **look: Any) -> Patch:
-    """Return a patch in one of matplotlib's colours. points: as in Patch."""
-    return Patch(points, np.broadcast_to(to_rgb(color), points.shape), **look)
+    """Return a patch in a colour such as "#4477aa". points: as in Patch."""
+    return Patch(points, np.broadcast_to(rgb(color), points.shape), **look)
 
 
 def view_of(patches: Sequence[Patch]) -> View:

@@ -19,10 +19,11 @@ from parameterize.files import replacing
 from parameterize.spline.body import BodyLike, as_body
 from parameterize.spline.volume import FACE_NAMES
 
-from .colors import MAP, ColorRange, color_labels
+from .colors import ColorRange, color_labels
 from .cutaway import Painted, beyond, visible
 from .fields import SECTIONS, Samples
 from .outline import is_by_face
+from .palette import MAP
 from .render import NAMELESS, Patch, View, draw, view_of, widest_view
 
 PANEL = (720, 560)  # pixels of one view

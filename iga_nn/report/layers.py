@@ -1,9 +1,9 @@
 """Makes the layers of the view: sharp edges, regions of loads and supports, and places where a gradient is infinite."""
 
+from itertools import cycle, islice
 from typing import Any
 
 import numpy as np
-from matplotlib.colors import to_hex
 from scipy.spatial import cKDTree
 
 from parameterize.arrays import Array
@@ -11,10 +11,10 @@ from parameterize.spline.body import BodyLike, as_body
 from solve.field import FieldOnBody
 from solve.singular import SingularPlaces
 
-from ..figures.colors import region_colors
 from ..figures.fields import points_of
 from ..figures.first_view import conditions_of
 from ..figures.outline import is_by_face, outline
+from ..figures.palette import TEN
 from ..figures.region_numbers import numbers_of
 from .packed import Drawn, numbered
 
@@ -36,7 +36,7 @@ def layers_of(body: BodyLike, solution: FieldOnBody | None, drawn: Drawn) -> dic
     if conditions := conditions_of(solution):
         twice = slice(None, None, 2 * drawn.coarser)
         numbers = numbers_of(body, conditions)[:, twice, twice]
-        colors = [to_hex(color) for color in region_colors(len(conditions))[:-1]]
+        colors = list(islice(cycle(TEN), len(conditions)))
         names = [f"{one.kind}: {one.region}{f' = {one.text}' if one.text else ''}" for one in conditions]
         layers["regions"] = {
             "legend": list(zip(colors, names, strict=True)),

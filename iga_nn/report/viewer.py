@@ -14,7 +14,6 @@ from dataclasses import dataclass, replace
 from typing import Any, Self
 
 import numpy as np
-from matplotlib import colormaps
 
 from parameterize.arrays import IntArray, Knots, Mask
 from parameterize.spline.body import BodyLike, as_body
@@ -24,7 +23,7 @@ from solve.field import BodyField, FieldOnBody
 from solve.forms.boundary_value_problem import BoundaryValueProblem
 from solve.forms.form import Quantity
 
-from ..figures.colors import MAP, color_labels, face_colors, face_labels, joint_range
+from ..figures.colors import color_labels, face_colors, face_labels, joint_range
 from ..figures.cutaway import WITH_OCTANTS, cut_of, seen_quarters
 from ..figures.fields import (
     PER_PATCH,
@@ -45,6 +44,7 @@ from ..figures.fields import (
 )
 from ..figures.first_view import shown_from
 from ..figures.outline import is_by_face, smooth_colors
+from ..figures.palette import SHADES
 from ..options import NO_UNITS, Units
 from .layers import layers_of
 from .packed import Drawn, packed
@@ -197,7 +197,7 @@ def _scene(
         "spans": spans,
         "meshes": meshes,  # of each patch the number of its entry in `spans`
         **_colors(body, drawn.faces),
-        "map": packed(colormaps[MAP](np.arange(256))[:, :3], np.uint8),  # (256, 3)
+        "map": packed(SHADES, np.uint8),  # (256, 3)
         "fields": [_described(field, frames[0], units) for field in whole[0].fields],
         **layers_of(body, solution, drawn),
         "frames": [_values(frame, bound, drawn) for frame in whole],

@@ -154,16 +154,19 @@ def gauss_points(knots: Array, n_points: int) -> tuple[Array, Array]:
 def insert_knots(knots: Array, degree: int, new: ArrayLike) -> tuple[Array, csr_array]:
     """Return the finer knot vector, and the matrix (n_new, n) from the old control points to the new ones.
 
-    The spline itself does not change. Raises ValueError for a knot outside the open range.
+    The spline itself does not change. Raises ValueError for a knot outside the open range. (The NURBS Book, eq. 5.15.)
     """
-    from scipy.interpolate import BSpline
-
-    spline = BSpline(knots, np.eye(len(knots) - degree - 1), degree)
+    finer, points = knots, np.eye(len(knots) - degree - 1)
     for t in np.sort(np.atleast_1d(np.asarray(new, dtype=np.float64))):
         if not knots[0] < t < knots[-1]:
             raise ValueError(f"new knot {t} lies outside the open interval ({knots[0]}, {knots[-1]})")
-        spline = spline.insert_knot(t)
-    return spline.t, csr_array(spline.c)
+        span = int(np.searchsorted(finer, t, side="right")) - 1
+        near = np.arange(span - degree + 1, span + 1)
+        share = ((t - finer[near]) / (finer[near + degree] - finer[near]))[:, None]
+        mixed = share * points[near] + (1.0 - share) * points[near - 1]
+        points = np.concatenate([points[: span - degree + 1], mixed, points[span:]])
+        finer = np.insert(finer, span + 1, t)
+    return finer, csr_array(points)
 
 
 def insertion_into(knots: Array, degree: int, finer: Array) -> csr_array:

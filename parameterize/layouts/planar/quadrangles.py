@@ -20,6 +20,7 @@ from ...surface.triangulation import triangulate
 from .polygons import cross, edges_of
 
 LEAST = 0.15  # the sine of the sharpest and of the bluntest angle of a quadrangle that is taken, about nine degrees
+RECTANGLE = 1.0 + 1e-9  # the cost of a rectangle, below which there is none
 _MOST_TRIED = 40  # sets of points on edges
 _MOST_ADDED = 2  # points on edges
 
@@ -56,9 +57,13 @@ def quadrangles_of(points: Array, loops: Sequence[Loop]) -> Quadrangles | None:
 
     loops: the outer polygon counterclockwise, those around holes clockwise.
     """
-    divided = [one for one in _decompositions(points, loops) if one.cost < np.inf]
-    best = min(divided, key=lambda one: one.cost, default=None)
-    return best if best is not None and best.cost * LEAST**2 <= len(best.corners) else None
+    best, least = None, np.inf
+    for one in _decompositions(points, loops):
+        if (cost := one.cost) < least:
+            best, least = one, cost
+        if least <= RECTANGLE:
+            break
+    return best if best is not None and least * LEAST**2 <= len(best.corners) else None
 
 
 def _decompositions(points: Array, loops: Sequence[Loop]) -> Iterator[Quadrangles]:

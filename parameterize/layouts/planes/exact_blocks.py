@@ -16,6 +16,7 @@ from .polyhedron import Polyhedron, polyhedron_of
 from .prisms import prisms
 
 LEAST_QUALITY = 0.1  # of a block: a corner is six degrees from flat, or det J a thousandth of that at another corner
+BOX = 1.0 + 1e-9  # the cost of a box, below which there is none
 _SAME = 1e-5  # relative: the volume and the area of blocks that fill a body are those of its surface
 
 
@@ -28,9 +29,18 @@ def exact_blocks(vertices: Array, faces: IntArray, most: int | None = None) -> C
     if body is None:
         return None
     limit = MOST_BLOCKS if most is None else min(most, MOST_BLOCKS)
-    good = [one for one in _decompositions(body, limit) if quality(one) >= LEAST_QUALITY]
-    turned = map(along_axes, sorted(good, key=cost))
-    return next((one for one in turned if _fills(one, body) and is_proved(one.body)), None)
+    good: list[Complex] = []
+    for one in _decompositions(body, limit):
+        if cost(one) <= BOX and _serves(turned := along_axes(one), body):
+            return turned
+        if quality(one) >= LEAST_QUALITY:
+            good.append(one)
+    return next((one for one in map(along_axes, sorted(good, key=cost)) if _serves(one, body)), None)
+
+
+def _serves(blocks: Complex, body: Polyhedron) -> bool:
+    """Return whether blocks fill a body, and are proved one-to-one."""
+    return _fills(blocks, body) and is_proved(blocks.body)
 
 
 def _decompositions(body: Polyhedron, most: int) -> Iterator[Complex]:
