@@ -21,7 +21,7 @@ def test_plain_files_have_the_content_of_all_others(ends, monkeypatch):
     monkeypatch.setattr(obj, "_plain", lambda lines: None)
     general = read(text)
     assert plain.vertices.tobytes() == general.vertices.tobytes()
-    assert plain.polygons == general.polygons
+    assert [list(row) for row in plain.polygons] == general.polygons
     assert plain.notices == general.notices == () and plain.groups == general.groups == {}
 
 

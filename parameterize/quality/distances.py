@@ -18,10 +18,12 @@ from ..spline.sampled_boundary import SampledBoundary
 from ..spline.volume import FACE_NAMES
 from ..surface.geometry import area_shares, normals_and_areas
 from ..surface.nearest import closest_triangles, distance_to_mesh
+from ..threads import in_parallel
 
 _NEWTON_STEPS = 5
 _DAMPING = 1e-12  # tangents may be parallel at an edge of the cube
 _ROUNDING = 1e-15  # of the largest coordinate: points that are so close come no closer
+_PIECE = 16_384  # points that one thread moves at once
 _CONVERGED = 1e-3  # a step that gains less than this share of the distance is the last
 
 
@@ -87,23 +89,38 @@ def closest_in_faces(points: Array, body: Body, patches: IntArray, start: Array,
     patches: (m,), of each point. axis: (m,), the direction that is constant on the cube face of each start. Parameters
     stay on that face.
     """
-    where = start.copy()
-    best: Array = np.linalg.norm(body.points(patches, where) - points, axis=1)
-    active = np.flatnonzero(best > _ROUNDING * np.abs(points).max(initial=0.0))
+    exact = _ROUNDING * np.abs(points).max(initial=0.0)
+
+    def piece(first: int) -> tuple[Array, Array]:
+        rows = slice(first, first + _PIECE)
+        return _closest(points[rows], body, patches[rows], start[rows], axis[rows], exact)
+
+    found = in_parallel(piece, range(0, max(len(points), 1), _PIECE))
+    where, best = (np.concatenate(parts) for parts in zip(*found, strict=True))
+    return where, best
+
+
+def _closest(
+    points: Array, body: Body, patches: IntArray, start: Array, axis: IntArray, exact: float
+) -> tuple[Array, Array]:
+    """Return what `closest_in_faces` returns. exact: the distance from which on no step is made."""
+    where, offsets = start.copy(), points - body.points(patches, start)
+    best: Array = np.linalg.norm(offsets, axis=1)
+    active = np.flatnonzero(best > exact)
     for _ in range(_NEWTON_STEPS):
         if not active.size:
             break
         trial, (a, b), rows = where[active], tangent_axes(axis[active]), np.arange(len(active))
         jacobian = body.jacobian(patches[active], trial)  # (k, 3, 3)
-        right = points[active] - body.points(patches[active], trial)
-        step_a, step_b = damped_fit(jacobian[rows, :, a], jacobian[rows, :, b], right, _DAMPING)
+        step_a, step_b = damped_fit(jacobian[rows, :, a], jacobian[rows, :, b], offsets[active], _DAMPING)
         trial[rows, a] += step_a
         trial[rows, b] += step_b
         np.clip(trial, 0.0, 1.0, out=trial)
-        distance = np.linalg.norm(body.points(patches[active], trial) - points[active], axis=1)
+        left = points[active] - body.points(patches[active], trial)
+        distance = np.linalg.norm(left, axis=1)
         gain = best[active] - distance
-        closer = gain > 0.0
-        where[active[closer]], best[active[closer]] = trial[closer], distance[closer]
+        closer, own = gain > 0.0, active[gain > 0.0]
+        where[own], offsets[own], best[own] = trial[closer], left[closer], distance[closer]
         active = active[gain > _CONVERGED * best[active]]
     return where, best
 

@@ -233,8 +233,8 @@ class Body(Brief, Shown):
         owners, where = np.asarray(patches), np.asarray(parameters, dtype=np.float64)
         if owners.shape != (len(where),) or where.shape[1:] != (3,):
             raise ValueError(f"give patches (m,) and parameters (m, 3), got shapes {owners.shape} and {where.shape}")
-        if len(unknown := np.setdiff1d(owners, np.arange(len(self)))):
-            raise ValueError(f"there is no patch {unknown[0]}: the body has {len(self)}, from 0 on")
+        if (unknown := (owners < 0) | (owners >= len(self))).any():
+            raise ValueError(f"there is no patch {owners[unknown].min()}: the body has {len(self)}, from 0 on")
         found = np.empty((len(where), *shape))
         labels, places = (row[owners.astype(np.int64)] for row in group_places(self.groups))
         for label in np.unique(labels):

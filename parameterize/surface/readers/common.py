@@ -61,6 +61,7 @@ class SolidPart:
 
 
 Solids = tuple[SolidPart, ...]
+Polygons = list[list[int]] | IntArray  # an array (m, 3) of triangles
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,7 +75,7 @@ class Content:
     """
 
     vertices: Array
-    polygons: list[list[int]]
+    polygons: Polygons
     notices: tuple[str, ...] = ()
     groups: Groups = field(default_factory=dict)
     unit: str = ""

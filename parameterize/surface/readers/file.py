@@ -14,7 +14,7 @@ from ...files import gunzip
 from ..errors import MeshError, check_face_count, check_finite, check_indices, without_unused_defects
 from ..groups import Groups, few, renumbered
 from ..triangulation import triangulate
-from .common import DAMAGED, Brep, Content, Solids, SurfaceFile, most_bytes
+from .common import DAMAGED, Brep, Content, Polygons, Solids, SurfaceFile, most_bytes
 from .zip_file import Archive, in_archive, in_folder
 
 # Modules and functions, loaded on use; each raises MeshError, without the file's name, for a bad file.
@@ -123,21 +123,29 @@ def _endings(name: str) -> tuple[str, str]:
 
 def triangles_of(content: Content, max_faces: int) -> tuple[Array, IntArray, tuple[str, ...], Groups]:
     """Check vertices and polygons; return vertices, the triangles (m, 3) that these are cut into, notices, groups."""
-    corners = np.fromiter(chain.from_iterable(content.polygons), dtype=np.int64)
+    polygons = content.polygons
+    corners, sizes = _flat(polygons)
     check_indices(content.vertices, corners)
     check_finite(content.vertices, corners)
     vertices, unused = without_unused_defects(content.vertices, corners)
     groups, too_many = few(content.groups)
     notices = content.notices + unused + too_many
-    fewest = min(map(len, content.polygons), default=0)
+    fewest = int(sizes.min()) if len(sizes) else 0
     if fewest < 3:
         raise MeshError(f"a face has {fewest} corners, expected at least 3; {DAMAGED}")
-    check_face_count(len(corners) - 2 * len(content.polygons), max_faces)  # before the time is spent on them
-    faces = triangulate(vertices, content.polygons)
-    pieces = [len(polygon) - 2 for polygon in content.polygons]
-    if len(faces) > len(content.polygons):
-        notices = (*notices, f"{len(content.polygons)} polygons cut into {len(faces)} triangles")
-    return vertices, faces, notices, renumbered(groups, np.repeat(np.arange(len(pieces)), pieces))
+    check_face_count(len(corners) - 2 * len(sizes), max_faces)  # before the time is spent on them
+    faces = polygons if isinstance(polygons, np.ndarray) else triangulate(vertices, polygons)
+    if len(faces) > len(sizes):
+        notices = (*notices, f"{len(sizes)} polygons cut into {len(faces)} triangles")
+    return vertices, faces, notices, renumbered(groups, np.repeat(np.arange(len(sizes)), sizes - 2))
+
+
+def _flat(polygons: Polygons) -> tuple[IntArray, IntArray]:
+    """Return the corners of all polygons, one after the other, and the number of corners of each."""
+    if isinstance(polygons, np.ndarray):
+        return polygons.ravel(), np.full(len(polygons), 3)
+    corners = np.fromiter(chain.from_iterable(polygons), dtype=np.int64)
+    return corners, np.fromiter(map(len, polygons), dtype=np.int64)
 
 
 def _read_bytes(path: Path, limit: int) -> bytes:

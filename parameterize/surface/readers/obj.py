@@ -82,7 +82,7 @@ def _plain(lines: list[str]) -> Content | None:
     faces = np.array(numbers.split(), dtype=np.int64).reshape(-1, 3) - 1
     if not len(vertices) or not len(faces) or faces.max() >= len(vertices):
         return None
-    return Content(vertices, faces.tolist())
+    return Content(vertices, faces)
 
 
 def _groups(named: list[tuple[int, list[str]]], count: int) -> Groups:

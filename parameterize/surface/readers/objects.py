@@ -30,7 +30,7 @@ def read_object(mesh: Any, kind: str, max_faces: int) -> RawMesh:
         content = READERS[kind](mesh)
     except (TypeError, ValueError) as error:  # rows of different lengths, texts in place of numbers
         raise MeshError(" ".join(str(error).split())) from None
-    if not content.polygons:
+    if not len(content.polygons):
         raise MeshError("has no faces: give a closed surface")
     vertices, faces, notices, groups = triangles_of(content, max_faces)
     digest = hashlib.sha256(vertices.tobytes() + faces.tobytes()).hexdigest()

@@ -43,7 +43,7 @@ def read_stl(file: SurfaceFile) -> Content:
     if solids := [] if is_binary else _solids(data):
         vertices, numbers = _shared_by_solid(vertices, solids)
     notices = ("binary STL although it starts with 'solid'",) * (is_binary and says_solid)
-    return Content(vertices, numbers.reshape(-1, 3).tolist(), notices, gathered(solids))
+    return Content(vertices, numbers.reshape(-1, 3), notices, gathered(solids))
 
 
 def _trimmed(data: bytes) -> bytes:
