@@ -225,7 +225,7 @@ def in_folder(
     What VTK draws, at seconds a figure, is left out for the others, and curves, half of a run without a training, are
     empty files.
     """
-    monkeypatch.setattr("iga_nn.workflow.pipeline.Painter", nullcontext)
+    monkeypatch.setattr("iga_nn.workflow.painter.Painter", nullcontext)
     if request.node.get_closest_marker("pictures") is None:
         monkeypatch.setattr("iga_nn.figures.render.can_draw", lambda: False)
         monkeypatch.setattr("iga_nn.figures.style.Picture.savefig", lambda _, path, **__: Path(path).touch())

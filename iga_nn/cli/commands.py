@@ -83,16 +83,18 @@ def run_problem(
 
 def _run(mesh: str, output: OutputOptions, mapping: MapOptions, problem_options: ProblemOptions | None = None) -> int:
     """Parameterize a surface, solve a problem on the volume, print the verdict and return the exit code."""
-    from ..workflow import pipeline
+    from ..workflow.painter import beside
     from .progress import shown_progress
 
-    with shown_progress(output.quiet) as progress:
+    with shown_progress(output.quiet) as progress, beside() as painter:
+        from ..workflow import pipeline  # takes as long to load as what draws, which loads meanwhile
+
         outcome = pipeline.parameterize_to(
             mesh,
             mapping=mapping,
             problem_options=problem_options,
             progress=progress,
-            paints_beside=True,
+            painter=painter,
             **output.folder,
         )
     return _tell(outcome, output)

@@ -19,13 +19,14 @@ from parameterize.files import replacing
 from parameterize.spline.body import BodyLike, as_body
 from parameterize.spline.volume import FACE_NAMES
 
-from .colors import ColorRange, color_labels
+from .colors import FACE_COLORS, ColorRange, color_labels
 from .cutaway import Painted, beyond, visible
 from .fields import SECTIONS, Samples
 from .outline import is_by_face
 from .palette import MAP
-from .render import NAMELESS, Patch, View, draw, view_of, widest_view
+from .render import NAMELESS, Patch, View, draw, plain_patch, view_of, widest_view
 
+PACKED = 4  # of 9: 2 % larger files than by 6 in two thirds of the time
 PANEL = (720, 560)  # pixels of one view
 NOTEBOOK_DPI = 72  # in a notebook a figure is as wide as the text
 UP, ASIDE = 0.4, 0.25  # of a viewer in front of a cut: shows more than one side of what is left
@@ -68,6 +69,13 @@ def show(
     """Draw patches on a panel under a title. marks, names, unit: as in `draw`."""
     panel.imshow(draw(patches, view, PANEL, marks, names, unit))
     panel.set_title(title, fontsize=13)
+
+
+def draws() -> bool:
+    """Return whether a picture of a square has more than one colour. Its window is the one that panels are drawn in."""
+    u, v = np.meshgrid([0.0, 1.0], [0.0, 1.0])
+    square = plain_patch(np.stack([u, v, np.zeros_like(u)], axis=-1)[None], FACE_COLORS[0])
+    return bool(draw([square], View(*np.eye(3)), PANEL).std() > 1.0)
 
 
 def show_around(
@@ -163,7 +171,8 @@ def save(figure: Figure, path: str | Path | None, title: str = "") -> Figure:
     if path is not None:
         with replacing(Path(path)) as temporary:
             if Path(path).suffix == ".png":
-                FigureCanvasAgg(figure).print_png(temporary)  # type: ignore[no-untyped-call]  # `savefig` draws it twice
+                canvas = FigureCanvasAgg(figure)  # `savefig` draws it twice
+                canvas.print_png(temporary, pil_kwargs={"compress_level": PACKED})  # type: ignore[no-untyped-call]
             else:
                 figure.savefig(temporary)
     return figure

@@ -7,8 +7,6 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from parameterize.spline.body import as_body
-
 from ..errors import one_line
 from ..report.artifacts import ARTIFACTS, Part
 
@@ -35,6 +33,8 @@ class Figures:
 
 def sampled(figures: Figures) -> Figures:
     """Return figures with the samples that they are drawn of, which the view in the page takes, too."""
+    from parameterize.spline.body import as_body
+
     from ..figures import fields
 
     known = figures.known

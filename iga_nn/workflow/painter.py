@@ -12,7 +12,8 @@ import pickle
 import signal
 import subprocess
 import sys
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from functools import cache
 from importlib import import_module
 from queue import SimpleQueue
@@ -20,6 +21,7 @@ from threading import Thread
 from typing import IO
 
 from parameterize.files import unfinished
+from parameterize.threads import default_threads
 
 from ..report.artifacts import files_of
 from . import drawing
@@ -95,6 +97,16 @@ class Painter:
         return failures
 
 
+@contextmanager
+def beside() -> Iterator[Painter | None]:
+    """Yield a process that draws figures, with more than one thread; it takes 300 MB."""
+    if default_threads() < 2:
+        yield None
+        return
+    with Painter() as painter:
+        yield painter
+
+
 def main() -> None:
     """Draw what comes in, until the input ends."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # where there are no process groups
@@ -127,12 +139,12 @@ def _read(source: IO[bytes], given: SimpleQueue[Figures]) -> None:
 @cache
 def _can_draw() -> bool:
     """Return whether VTK draws, tried in this process: where it crashes, the run tries and tells."""
-    from ..figures import probe
+    from ..figures.probe import choose_window
     from ..figures.render import CANNOT_DRAW
 
-    probe.choose_window()
+    choose_window()
     try:
-        done = probe.draws()
+        done = import_module("iga_nn.figures.style").draws()
     except Exception:
         done = False
     if not done:

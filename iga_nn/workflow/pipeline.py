@@ -19,7 +19,6 @@ from parameterize.files import digest, save_text
 from parameterize.progress import ProgressCallback
 from parameterize.spline.body import BodyLike, as_body
 from parameterize.spline.volume import BSplineVolume
-from parameterize.threads import default_threads
 from parameterize.time_limit import OutOfTime, closing
 from solve import ConvergenceRow, Solution, SolveOptions, check_device, check_problem, convergence, modes
 from solve.asked.functional import functional
@@ -162,12 +161,12 @@ def parameterize_to(
     force: bool = False,
     vector: bool = False,
     progress: ProgressCallback | None = None,
-    paints_beside: bool = False,
+    painter: Painter | None = None,
     time_limit: float | str | None = None,
 ) -> Outcome:
     """Parameterize a surface and, where a problem is given, solve it on the volume, as `run` does.
 
-    paints_beside: whether, with more than one thread, a process beside the run draws the figures; it takes 300 MB.
+    painter: a process beside the run that draws the figures.
     """
     mapping = mapping or MapOptions()
     check_type("mapping", mapping, MapOptions)
@@ -175,13 +174,8 @@ def parameterize_to(
     check_type("out", out, str | Path | None)
     check_type("progress", progress, Callable | None)
     problem, unknowns = (None, 0) if problem_options is None else checked(mapping, problem_options)
-    with (
-        clock(time_limit),
-        open_folder(mesh, out, force, mapping.resume, vector) as state,
-        ExitStack() as stack,
-    ):
-        if paints_beside and not state.finished and default_threads() > 1:
-            state.painter = stack.enter_context(Painter())
+    with clock(time_limit), open_folder(mesh, out, force, mapping.resume, vector) as state:
+        state.painter = painter
         with state.timed("load"):
             given = read_input(mesh, mapping, state.finished.report if state.finished else None)
         identity = _identity(given.identity, problem_options)
