@@ -37,13 +37,14 @@ class UnitFrame:
         outer faces, BOX_SAMPLES a span and direction. The folded parts of a map count with the opposite sign.
         Raises ValueError where the volume encloses nothing.
         """
-        if body not in _KNOWN:
-            _KNOWN[body] = cls._measured(body)
-        return _KNOWN[body]
+        glued = as_body(body)
+        known: BodyLike = glued.only if glued.is_single else glued
+        if known not in _KNOWN:
+            _KNOWN[known] = cls._measured(glued)
+        return _KNOWN[known]
 
     @classmethod
-    def _measured(cls, body: BodyLike) -> "UnitFrame":
-        glued = as_body(body)
+    def _measured(cls, glued: Body) -> "UnitFrame":
         ends = np.concatenate(list(_boxes(glued)))  # (f, 2, 3)
         middle = (ends[:, 0].min(axis=0) + ends[:, 1].max(axis=0)) / 2.0
         enclosed = sum(float(np.abs(enclosed_volumes(group, middle)).sum()) for group in glued.groups)
