@@ -7,11 +7,13 @@ loses its shortest edges first, and no collapse may leave a thin triangle or tur
 """
 
 from collections.abc import Iterator
+from functools import partial
 
 import numba
 import numpy as np
 
 from ..arrays import Array, IntArray, Mask
+from ..threads import in_parallel
 from .geometry import directed_edges
 
 _RANKED = 0.25  # share of the edges that may be collapsed before all are ranked anew
@@ -22,6 +24,7 @@ _TURN = 0.5  # least cosine between the normals of a triangle before and after a
 _NORMAL = 1e-6  # shape below which a triangle has no normal that counts
 _EVEN = 1e-8  # of an edge's length beside the distance from the planes
 _HOLD = 1e-6  # of the distance from the edge's middle, which decides where the planes do not
+_PIECE = 32_768  # edges that one thread weighs at once
 _QUADRIC = 10  # numbers of a quadric: xx, xy, xz, yy, yz, zz, x, y, z, 1
 
 
@@ -35,7 +38,9 @@ def collapsed(vertices: Array, faces: IntArray, most: int) -> tuple[Array, IntAr
     while len(faces) > most:
         sides = directed_edges(faces)
         edges = sides[sides[:, 0] < sides[:, 1]]  # each once: a closed surface has both directions
-        errors, places = _errors(points, quadrics, edges)
+        pieces = np.array_split(edges, range(_PIECE, len(edges), _PIECE))
+        found = in_parallel(partial(_errors, points, quadrics), pieces)
+        errors, places = (np.concatenate(rows) for rows in zip(*found, strict=True))
         first = np.argsort(errors, kind="stable")[: int(np.ceil(ranked * len(edges)))]
         kept = _collapse(points, faces, quadrics, edges[first], places[first], most, shape)
         before, faces = len(faces), faces[kept]

@@ -19,6 +19,7 @@ from .readers.file import RawMesh
 from .sheets import split, without_doubled, without_flaps
 from .shells import wound_as_walls
 from .solids import only
+from .soundness import is_sound
 from .topology import check_edges, check_vertices, crossing_faces
 from .welding import weld_and_drop, wind_alike
 
@@ -52,14 +53,21 @@ def _of_components(raw: RawMesh, asked: Asked) -> tuple[MeshRepair, IntArray, li
     """Return the closed components of a mesh, wound as walls of bodies, the body of each face, and notices."""
     mesh, mended = without_defects(raw, asked.max_faces)
     mesh, chosen = choose_component(mesh, asked.component, asked.close)
-    mesh = mesh.compact()
+    mesh, closed = _closed(mesh.compact(), asked.close)
+    mesh, owners, outward = wound_as_walls(mesh)
+    return mesh, owners, [*mended, *chosen, *closed, *outward]
+
+
+def _closed(mesh: MeshRepair, close: Close) -> tuple[MeshRepair, list[str]]:
+    """Return the mesh wound alike and with its holes filled, and notices. Raises MeshError where that is no surface."""
+    if is_sound(mesh.faces):
+        return mesh, []
     check_edges(mesh.faces, mesh.where)
     alike, turned = wind_alike(mesh.faces)
-    mesh, closed = close_holes(replace(mesh, faces=alike), asked.close)
+    mesh, closed = close_holes(replace(mesh, faces=alike), close)
     check_edges(mesh.faces, mesh.where)
     check_vertices(mesh.faces, mesh.where)
-    mesh, owners, outward = wound_as_walls(mesh)
-    return mesh, owners, [*mended, *chosen, *turned, *closed, *outward]
+    return mesh, [*turned, *closed]
 
 
 def _of_solids(raw: RawMesh, asked: Asked) -> tuple[MeshRepair, IntArray, list[str]]:
@@ -111,10 +119,11 @@ def without_defects(raw: RawMesh, max_faces: int) -> tuple[MeshRepair, list[str]
     triangles, left, mended = weld_and_drop(unit, faces)
     if len(triangles) < 4:
         raise MeshError(f"{len(triangles)} triangles that are not degenerate, at least 4 are needed: export it again")
-    mesh, doubled = without_doubled(MeshRepair(vertices, unit, triangles, left, middle, size))
-    mesh, loose = without_flaps(mesh)
-    mesh, touching = split(mesh)
-    return mesh, [*raw.notices, *remarks, *mended, *doubled, *loose, *touching]
+    mesh, notices = MeshRepair(vertices, unit, triangles, left, middle, size), [*raw.notices, *remarks, *mended]
+    for repair in () if is_sound(triangles) else (without_doubled, without_flaps, split):
+        mesh, repaired = repair(mesh)
+        notices += repaired
+    return mesh, notices
 
 
 def _box(vertices: Array, faces: IntArray) -> tuple[Array, float, list[str]]:

@@ -13,7 +13,6 @@ from ..arrays import Array, IntArray, Mask
 from .errors import MeshError
 from .geometry import connected, directed_edges, edge_table, normals_and_areas, signed_volume
 from .mesh_repair import MeshRepair
-from .soundness import is_sound
 
 
 def without_doubled(mesh: MeshRepair) -> tuple[MeshRepair, list[str]]:
@@ -22,8 +21,6 @@ def without_doubled(mesh: MeshRepair) -> tuple[MeshRepair, list[str]]:
     One of the equal faces is kept where the surface is open without them, none where it is closed, as at the wall
     between two rooms or where two triangles lie on each other.
     """
-    if is_sound(mesh.faces):
-        return mesh, []
     rows = np.sort(mesh.faces, axis=1)
     _, first, label, counts = np.unique(rows, axis=0, return_index=True, return_inverse=True, return_counts=True)
     label = label.ravel()
@@ -77,8 +74,6 @@ def split(mesh: MeshRepair) -> tuple[MeshRepair, list[str]]:
     Edges whose faces do not enclose material by turns keep all their faces, as they are. A vertex where holes of one
     component meet is kept: their filling joins the faces there.
     """
-    if is_sound(mesh.faces):
-        return mesh, []
     counts = edge_table(mesh.faces)[1]
     pinched = ~igl.is_vertex_manifold(mesh.faces)
     if counts.max() <= 2 and not pinched.any():
@@ -164,8 +159,6 @@ def without_flaps(mesh: MeshRepair) -> tuple[MeshRepair, list[str]]:
     Loose are the sheets, bounded by edges of more than two faces, that have an open edge; they are dropped where every
     edge on which they hang has two faces left, otherwise all are kept.
     """
-    if is_sound(mesh.faces):
-        return mesh, []
     numbers = edge_table(mesh.faces)[1]
     if not (numbers == 1).any() or numbers.max() < 3:
         return mesh, []

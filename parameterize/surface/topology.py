@@ -12,7 +12,6 @@ from igl.predicates import find_self_intersections
 from ..arrays import Array, IntArray, in_brackets
 from .errors import MeshError
 from .geometry import edge_table, used_vertices
-from .soundness import is_sound
 
 Where = Callable[[int], str]
 SLIVER_DEGREES = 0.5
@@ -21,8 +20,6 @@ SHOWN = 5  # pairs of faces that cross
 
 def check_edges(faces: IntArray, where: Where) -> None:
     """Raise MeshError for an edge with more than two faces."""
-    if is_sound(faces):
-        return
     edges, counts = edge_table(faces)
     crowded = edges[counts > 2]
     if len(crowded):
@@ -34,8 +31,6 @@ def check_edges(faces: IntArray, where: Where) -> None:
 
 def check_vertices(faces: IntArray, where: Where) -> None:
     """Raise MeshError for a vertex where sheets touch."""
-    if is_sound(faces):
-        return
     pinched = np.flatnonzero(~igl.is_vertex_manifold(faces))
     if len(pinched):
         raise MeshError(

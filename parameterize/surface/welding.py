@@ -31,16 +31,11 @@ def weld_and_drop(vertices: Array, faces: IntArray) -> tuple[IntArray, IntArray,
     closed = is_closed(solid)
     edges = directed_edges(solid)
     short = edges[np.linalg.norm(np.subtract(*vertices[edges.T]), axis=1) <= WELD_TOLERANCE]
-    label = connected(short if closed else close_pairs(vertices, solid), len(vertices))
-    welded = np.unique(label, return_index=True)[1][label][solid]  # the lowest number of the joined vertices
-    apart = _distinct(welded)
-    if closed and not is_closed(welded[apart]):
-        welded = solid  # collapsing would tear the surface: keep its edges of no length
+    if closed and not len(short):
+        welded = solid
     else:
-        welded, kept = welded[apart], kept[apart]
-    if not is_closed(welded):
-        thick = _areas(vertices, welded) > FLAT
-        welded, kept = welded[thick], kept[thick]
+        welded, rows = _welded(vertices, solid, short if closed else close_pairs(vertices, solid), closed)
+        kept = kept[rows]
     used = len(used_vertices(faces))
     removed = used - len(used_vertices(welded)) if len(welded) else 0
     if removed:
@@ -51,6 +46,21 @@ def weld_and_drop(vertices: Array, faces: IntArray) -> tuple[IntArray, IntArray,
     if unused:
         notices.append(f"dropped {unused} vertices that no face uses")
     return welded, kept, notices
+
+
+def _welded(vertices: Array, faces: IntArray, links: IntArray, closed: bool) -> tuple[IntArray, IntArray]:
+    """Return faces whose linked vertices are one, without degenerate ones, and their rows among the given faces."""
+    label = connected(links, len(vertices))
+    welded = np.unique(label, return_index=True)[1][label][faces]  # the lowest number of the joined vertices
+    rows = np.flatnonzero(_distinct(welded))
+    if closed and not is_closed(welded[rows]):
+        rows, welded = np.arange(len(faces)), faces  # collapsing would tear it: keep its edges of no length
+    else:
+        welded = welded[rows]
+    if not is_closed(welded):
+        thick = _areas(vertices, welded) > FLAT
+        welded, rows = welded[thick], rows[thick]
+    return welded, rows
 
 
 def wind_alike(faces: IntArray) -> tuple[IntArray, list[str]]:
@@ -66,8 +76,6 @@ def wind_alike(faces: IntArray) -> tuple[IntArray, list[str]]:
 
 def is_oriented(faces: IntArray) -> bool:
     """Return whether no two faces run along an edge in the same direction."""
-    if is_sound(faces):
-        return True
     edges = directed_edges(faces)
     keys = edges[:, 0] * (int(faces.max()) + 1) + edges[:, 1]
     return len(np.unique(keys)) == len(keys)
