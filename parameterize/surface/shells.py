@@ -17,7 +17,7 @@ LISTED = 8
 
 def components(faces: IntArray) -> list[IntArray]:
     """Return the face numbers of each component (faces sharing a vertex), the largest first."""
-    label = connected(directed_edges(faces), int(faces.max()) + 1)[faces[:, 0]]
+    label = connected(faces[:, [0, 1, 0, 2]].reshape(-1, 2), int(faces.max()) + 1)[faces[:, 0]]
     order = np.argsort(label, kind="stable")
     groups = np.split(order, np.flatnonzero(np.diff(label[order])) + 1)
     return sorted(groups, key=lambda group: (-len(group), int(group[0])))
