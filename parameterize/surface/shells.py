@@ -7,7 +7,7 @@ import numpy as np
 
 from ..arrays import IntArray
 from .errors import MeshError
-from .geometry import connected, directed_edges, signed_volume
+from .geometry import connected, signed_volume
 from .mesh_repair import MeshRepair
 from .solid import Solid
 
