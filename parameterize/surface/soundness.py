@@ -8,20 +8,21 @@ from ..arrays import IntArray
 _LEAST_FACES = 3  # around a vertex: two lie on each other
 
 
-@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def is_sound(faces: IntArray) -> bool:
     """Return whether every edge has two faces, which run along it in opposite directions, and every vertex one fan.
 
     No two of such faces have the same three corners, and no face has a corner twice.
     """
-    if len(faces) == 0 or faces.min() < 0:
+    if not len(faces) or faces.min() < 0:
         return False
-    ends = np.zeros(faces.max() + 2, dtype=np.int64)  # of the corners at each vertex, which are 3 i + k
-    for face in faces:
-        for vertex in face:
-            ends[vertex + 1] += 1
-    ends = np.cumsum(ends)
-    corners, filled = np.empty(3 * len(faces), dtype=np.int64), ends[:-1].copy()
+    ends = np.concatenate([[0], np.cumsum(np.bincount(faces.ravel()))])
+    return bool(_has_fans(np.ascontiguousarray(faces), ends))
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _has_fans(faces: IntArray, ends: IntArray) -> bool:
+    """Return whether faces are sound; ends: the number of corners at all vertices before each one, and of all."""
+    corners, filled = np.empty(3 * len(faces), dtype=np.int64), ends.copy()  # corners are 3 i + k
     for corner in range(3 * len(faces)):
         vertex = faces[corner // 3, corner % 3]
         corners[filled[vertex]] = corner

@@ -30,7 +30,8 @@ class TriangleTree:
     def __init__(self, vertices: Array, faces: IntArray) -> None:
         corners = np.ascontiguousarray(vertices, dtype=np.float64)[faces]
         leaves = 2 ** ceil(log2(max(1.0, len(faces) / _IN_LEAF)))
-        self._order = _ordered(corners, leaves)
+        self._order = np.arange(len(faces))
+        _order(self._order, corners.sum(axis=1), leaves)
         self._corners = corners[self._order]
         self._boxes = _boxes(self._corners, leaves)
 
@@ -52,28 +53,26 @@ class TriangleTree:
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def _ordered(corners: Array, leaves: int) -> IntArray:
-    """Return an order (m,) of triangles (m, 3, 3) in which each node's own follow one another.
+def _order(order: IntArray, middles: Array, leaves: int) -> None:
+    """Order triangles (m,) so that each node's own follow one another.
 
-    The triangles of a node are halved along the longest side of the box of their middles.
+    The triangles of a node are halved along the longest side of the box of their middles (m, 3).
     """
-    middles = np.empty((len(corners), 3))
-    for t in range(len(corners)):
-        for d in range(3):
-            middles[t, d] = corners[t, 0, d] + corners[t, 1, d] + corners[t, 2, d]
-    order, nodes = np.arange(len(corners)), 1
+    low, high, nodes = np.empty(3), np.empty(3), 1
     while nodes < leaves:
         for node in range(nodes):
-            first, end = _share(len(corners), node, nodes)
-            half = _share(len(corners), 2 * node, 2 * nodes)[1]
+            first, end = _share(len(order), node, nodes)
+            half = _share(len(order), 2 * node, 2 * nodes)[1]
             if first < half < end:
-                low, high = np.full(3, np.inf), np.full(3, -np.inf)
+                low[:], high[:] = np.inf, -np.inf
                 for t in order[first:end]:
                     for d in range(3):
                         low[d], high[d] = min(low[d], middles[t, d]), max(high[d], middles[t, d])
-                _halve(order, middles[:, np.argmax(high - low)], first, half, end - 1)
+                longest = 0
+                for d in range(1, 3):
+                    longest = d if high[d] - low[d] > high[longest] - low[longest] else longest
+                _halve(order, middles[:, longest], first, half, end - 1)
         nodes *= 2
-    return order
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
