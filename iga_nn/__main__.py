@@ -1,6 +1,8 @@
 """Runs the console script and `python -m iga_nn`; the command line is imported where Ctrl-C is caught already."""
 
+import atexit
 import gc
+import os
 import signal
 import sys
 from types import FrameType
@@ -13,6 +15,7 @@ PAUSE = 0.1  # seconds after which an interruption is tried again
 
 def run_and_exit() -> None:
     """Run the command line on the program's arguments."""
+    atexit.register(_fall_silent)  # the first one to be registered is the last one to be called
     try:
         catch_signals()
         gc.set_threshold(OBJECTS)
@@ -24,6 +27,12 @@ def run_and_exit() -> None:
         code = 130
     gc.freeze()  # else Python looks through all objects for cycles before it ends, for half a second
     sys.exit(code)
+
+
+def _fall_silent() -> None:
+    """Drop what libraries print once Python ends: igl lists each of its objects that `gc.freeze` leaves in a cycle."""
+    sys.stderr.flush()
+    os.dup2(os.open(os.devnull, os.O_WRONLY), 2)
 
 
 def catch_signals() -> None:

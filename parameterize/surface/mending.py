@@ -19,9 +19,8 @@ from .readers.file import RawMesh
 from .sheets import split, without_doubled, without_flaps
 from .shells import wound_as_walls
 from .solids import only
-from .soundness import is_sound
 from .topology import check_edges, check_vertices, crossing_faces
-from .welding import weld_and_drop, wind_alike
+from .welding import is_known_sound, weld_and_drop, wind_alike
 
 USUAL_SIZES = (1e-6, 1e6)
 
@@ -60,7 +59,7 @@ def _of_components(raw: RawMesh, asked: Asked) -> tuple[MeshRepair, IntArray, li
 
 def _closed(mesh: MeshRepair, close: Close) -> tuple[MeshRepair, list[str]]:
     """Return the mesh wound alike and with its holes filled, and notices. Raises MeshError where that is no surface."""
-    if is_sound(mesh.faces):
+    if is_known_sound(mesh.faces):
         return mesh, []
     check_edges(mesh.faces, mesh.where)
     alike, turned = wind_alike(mesh.faces)
@@ -120,7 +119,7 @@ def without_defects(raw: RawMesh, max_faces: int) -> tuple[MeshRepair, list[str]
     if len(triangles) < 4:
         raise MeshError(f"{len(triangles)} triangles that are not degenerate, at least 4 are needed: export it again")
     mesh, notices = MeshRepair(vertices, unit, triangles, left, middle, size), [*raw.notices, *remarks, *mended]
-    for repair in () if is_sound(triangles) else (without_doubled, without_flaps, split):
+    for repair in () if is_known_sound(triangles) else (without_doubled, without_flaps, split):
         mesh, repaired = repair(mesh)
         notices += repaired
     return mesh, notices

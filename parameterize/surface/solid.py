@@ -19,6 +19,7 @@ _ROUNDING = 1e-6  # error of a distance, in cells
 _CELLS = 16  # of `deepest` along the box's longest side, at the first level
 _TOLERANCE = 1e-3  # share of the depth
 _MOST_CELLS = 4000  # kept at a level; only sheets thinner than a hundredth of the box reach it
+_FEW = 2000  # triangles: compiled code takes longer to load than libigl to search them
 _LEVELS = 16  # of halving, at most
 # Of the 26 directions to the neighbours of a lattice point one of each pair of opposite ones: its first part is 1.
 DIRECTIONS = [(x, y, z) for x, y, z in product((0, 1, -1), repeat=3) if (x, y, z) > (0, 0, 0)]
@@ -39,14 +40,14 @@ class Solid:
 
     @cached_property
     def _tree(self) -> Any:
-        """Return the tree of boxes that finds the triangles on rays."""
+        """Return the tree of boxes that finds the triangles on rays, and the nearest ones of few."""
         tree = igl.AABB()
         tree.init(self._vertices, self._faces)
         return tree
 
     @cached_property
     def _triangles(self) -> TriangleTree:
-        """Return the tree that finds nearest triangles."""
+        """Return the tree that finds nearest triangles of many."""
         return TriangleTree(self._vertices, self._faces)
 
     @cached_property
@@ -70,7 +71,10 @@ class Solid:
 
     def squared_depths(self, points: Array) -> Array:
         """Return the squared distances (n,) of points (n, 3) from the surface."""
-        return self._triangles.nearest(points)[0]
+        if len(self._faces) > _FEW:
+            return self._triangles.nearest(points)[0]
+        squares = self._tree.squared_distance(self._vertices, self._faces, np.ascontiguousarray(points))[0]
+        return np.asarray(squares).ravel()
 
     def signed_distances(self, points: Array) -> Array:
         """Return the distances (n,) of points (n, 3) from the surface, negative inside, to some thousandths."""

@@ -7,15 +7,27 @@ from scipy.spatial import KDTree
 from ..arrays import Array, IntArray, Mask
 from .errors import MeshError
 from .geometry import connected, directed_edges, doubled_areas, edge_table, used_vertices
-from .soundness import is_sound
 
 WELD_TOLERANCE = 1e-7  # share of the box's longest side: points this close are one in single precision
+_MANY = 10_000  # faces
 FLAT = 1e-14  # twice a face's area over its longest edge squared, below which it counts as degenerate
+
+
+def is_known_sound(faces: IntArray) -> bool:
+    """Return whether faces (m, 3) are found closed and sound, and need no repair; few are not asked about.
+
+    The searches for repairs take less than it takes to load the compiled test, if there are few faces.
+    """
+    if len(faces) < _MANY:
+        return False
+    from .soundness import is_sound
+
+    return is_sound(faces)
 
 
 def is_closed(faces: IntArray) -> bool:
     """Return whether every edge has exactly two faces."""
-    return is_sound(faces) or (len(faces) > 0 and bool(np.all(edge_table(faces)[1] == 2)))
+    return is_known_sound(faces) or (len(faces) > 0 and bool(np.all(edge_table(faces)[1] == 2)))
 
 
 def weld_and_drop(vertices: Array, faces: IntArray) -> tuple[IntArray, IntArray, list[str]]:

@@ -19,6 +19,7 @@ from ..cube.cube import CubeLayout
 from ..cube.edge_paths import PathError, choose_corners, cut_surface, edge_targets
 from ..cube.turning import best_turn, concavity
 from ..progress import History, Progress, ProgressCallback
+from ..surface.errors import MeshError
 from ..surface.solid import Solid
 from .losses import STAGES, BoundaryData, EdgePaths, Objective
 from .network import InverseMap
@@ -30,6 +31,8 @@ State = dict[str, Floats]
 _CHECKPOINT, _CHECKPOINT_STEPS = "training", 100
 _COMPARED_STEPS = 8  # the last ones of a race, whose mean scores are compared
 _REST = 0.02  # share of the other terms in a race's score beside the distortion: a run may still be far from the cube
+_FEWEST = 10  # points of a lattice inside: fewer do not tell how wide a body is
+_TOO_THIN = "the body is too thin for the network: hardly a point of a lattice lies inside; scale its thickness up"
 _RACE_GAIN = 0.05  # share by which the turned G must be better, first in concavity and then in the score
 
 
@@ -70,7 +73,10 @@ class Trainer:
         self.history, self.progress, self.checkpoints = history, progress, checkpoints
         self.network = InverseMap(config.network, np.random.default_rng(seed), device, dtype)
         if config.train.whiten:
-            self.network.affine = self.network.there(start_map(Solid(vertices, faces).lattice(config.train.cell)))
+            inside = Solid(vertices, faces).lattice(config.train.cell)
+            if len(inside) < _FEWEST:
+                raise MeshError(_TOO_THIN)
+            self.network.affine = self.network.there(start_map(inside))
         self.objective = Objective(self.network, stencils(vertices, faces, config.train.cell))
 
     def run(self, *, give_up: bool = False) -> InverseMap | None:

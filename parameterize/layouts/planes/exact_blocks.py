@@ -30,7 +30,7 @@ def exact_blocks(vertices: Array, faces: IntArray, most: int | None = None) -> C
         return None
     limit = MOST_BLOCKS if most is None else min(most, MOST_BLOCKS)
     good: list[Complex] = []
-    for one in _decompositions(body, limit):
+    for one in filter(len, _decompositions(body, limit)):  # a body may be too thin for any
         if cost(one) <= BOX and _serves(turned := along_axes(one), body):
             return turned
         if quality(one) >= LEAST_QUALITY:

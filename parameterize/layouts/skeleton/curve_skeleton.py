@@ -101,9 +101,9 @@ def _thinnest(lattice: Lattice, vertices: Array) -> Array:
     point of the thinned body.
     """
     gaps = np.asarray(cKDTree(lattice.places(np.argwhere(lattice.inside))).query(vertices)[0])
-    if gaps.max() > UNREACHED * lattice.cell:
-        return np.asarray(vertices[np.argmax(gaps)])
     points = web_of(lattice.inside).points()
+    if gaps.max() > UNREACHED * lattice.cell or not len(points):
+        return np.asarray(vertices[np.argmax(gaps)])
     return lattice.places(points[np.argmin(Depth(lattice.inside).at(points))])
 
 
