@@ -718,3 +718,23 @@ def test_close_may_stand_before_the_name_and_takes_all(words, in_folder, capsys)
     Path("open.obj").write_text(obj(vertices, faces[1:]))
     assert main(["check", *words]) == 0
     assert "closed 1 boundary loop" in capsys.readouterr().out
+
+
+HERE = os.environ | {"PYTHONPATH": str(Path(iga_nn.__file__).parents[1])}
+LAST_WORDS = """
+import os, sys
+class Library:
+    def __del__(self, write=os.write):
+        write(2, b"leaked")
+kept = Library()
+sys.argv = ["iga-nn", "--version"]
+from iga_nn.__main__ import run_and_exit
+run_and_exit()
+"""
+
+
+def test_libraries_say_nothing_once_python_ends():
+    done = subprocess.run([sys.executable, "-c", LAST_WORDS], capture_output=True, text=True, env=HERE)
+    assert (done.returncode, done.stderr) == (0, "")
+    loud = LAST_WORDS.replace("run_and_exit()", "sys.exit()")
+    assert "leaked" in subprocess.run([sys.executable, "-c", loud], capture_output=True, text=True, env=HERE).stderr

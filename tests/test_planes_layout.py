@@ -78,6 +78,13 @@ def test_bodies_without_exact_blocks_have_none():
     assert blocks_of(*rounded_cube(200)) is None
 
 
+@pytest.mark.parametrize("height", [1e-6, 1e-3])
+def test_a_thin_plate_over_a_triangle_is_no_crash(height):
+    """Its cells may all be merged away."""
+    blocks = blocks_of(*arrays(prism(np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]), height)))
+    assert blocks is None or len(blocks) == 3
+
+
 def test_no_more_blocks_than_are_allowed():
     vertices, faces = arrays("U")
     assert len(blocks_of(vertices, faces, most=3)) == 3  # with two mitres

@@ -21,6 +21,7 @@ from parameterize.cube.cutting import subdivide_finely
 from parameterize.optimization.phases import FIRM_ROUNDS
 from parameterize.run import corner_vertices, parameterize
 from parameterize.spline.sampled_boundary import SampledBoundary
+from parameterize.surface.errors import MeshError
 from parameterize.surface.surface import surface_from_arrays
 from parameterize.training.backend import choose_device, choose_precision
 from parameterize.training.trainer import start_map
@@ -379,6 +380,14 @@ def test_a_seed_of_any_size_is_taken(surface):
     for seed in (0, 2**62):
         with pytest.raises(KeyboardInterrupt):
             parameterize(surface, tiny_config(), seed=seed, device="cpu", progress=interrupt)
+
+
+def test_a_rod_too_thin_for_a_lattice_is_refused_with_the_remedy():
+    corners = np.array([[x, y, z] for x in (0.0, 1e-6) for y in (0.0, 1e-6) for z in (0.0, 1.0)])
+    sides = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
+    rod = surface_from_arrays(corners, np.array([half for a, b, c, d in sides for half in ([a, b, c], [a, c, d])]))
+    with pytest.raises(MeshError, match="too thin for the network: .*; scale its thickness up"):
+        parameterize(rod, tiny_config(), seed=0)
 
 
 def test_the_start_map_makes_a_cloud_round():

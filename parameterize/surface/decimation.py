@@ -32,7 +32,7 @@ def decimate(surface: Surface, max_faces: int) -> Surface:
     if before <= max_faces:
         return surface
     smaller, moved = _reduced(surface, max_faces)
-    notice = f"decimated from {before} to {len(smaller.faces)} faces: moved by at most {moved:.3g}"
+    notice = f"decimated from {before} to {len(smaller.faces)} faces: moved by at most {moved:.3g} at vertices"
     # Earlier notices concern the given surface, later ones the decimated surface.
     return replace(smaller, notices=(*surface.notices, notice, *smaller.notices))
 
@@ -47,7 +47,8 @@ def fitted_copy(surface: Surface) -> tuple[Surface, str]:
     except MeshError as error:  # such as a surface that meets itself, whose copy tears
         return surface, f"laid out and fitted with all its {before} faces, which takes long: {error}"
     return replace(copy, sharp=surface.sharp), (
-        f"laid out and fitted on a copy of {len(copy.faces)} faces, at most {moved:.3g} away; measured on all {before}"
+        f"laid out and fitted on a copy of {len(copy.faces)} faces, at most {moved:.3g} away at vertices; "
+        f"measured on all {before}"
     )
 
 
@@ -72,7 +73,7 @@ def _reduced(surface: Surface, max_faces: int) -> tuple[Surface, float]:
 
 
 def _checked(surface: Surface, vertices: Array, faces: IntArray, max_faces: int) -> tuple[Surface, float]:
-    """Return the surface of fewer triangles, by their placed vertices (n, 3), and how far it moved."""
+    """Return the surface of fewer triangles, by their placed vertices (n, 3), and how far vertices moved."""
     if len(faces) > max_faces:
         name = surface.source or surface.name
         raise MeshError(f"{name}: cannot be decimated below {len(faces)} faces: raise --max-faces")
