@@ -8,8 +8,9 @@ import pytest
 
 from iga_nn.cli.commands import main
 from iga_nn.samples import sample, write_obj
+from parameterize.surface import decimation
 from parameterize.surface.decimation import decimate
-from parameterize.surface.surface import MeshError
+from parameterize.surface.surface import MeshError, surface_from_arrays
 
 
 def test_a_small_surface_is_left_alone():
@@ -59,3 +60,31 @@ def test_a_run_with_decimation_says_so(formula_training, in_folder, capsys):
     found = report.read(in_folder / "out")
     assert found["input"]["faces"] == 1000 and found["command"].endswith("--max-faces 1000 --decimate --out out")
     assert "decimated from 4996 to 1000 faces" in capsys.readouterr().err
+
+
+def bent_plate(cells, thickness):
+    """Return a wavy plate over the unit square, its triangles as two sheets and a rim."""
+    row = np.linspace(0.0, 1.0, cells + 1)
+    x, y = np.meshgrid(row, row, indexing="ij")
+    low = np.stack([x, y, 0.05 * np.sin(7.0 * x) * np.cos(5.0 * y)], axis=-1)
+    numbers = np.arange(low.size // 3).reshape(low.shape[:2])
+    a, b, c, d = numbers[:-1, :-1], numbers[1:, :-1], numbers[1:, 1:], numbers[:-1, 1:]
+    upper = np.concatenate([np.stack(three, axis=-1).reshape(-1, 3) for three in ((a, b, c), (a, c, d))])
+    ring = np.concatenate([numbers[:-1, 0], numbers[-1, :-1], numbers[:0:-1, -1], numbers[0, :0:-1]])
+    after, below = np.roll(ring, -1), numbers.size
+    rim = np.concatenate(
+        [np.stack([ring, ring + below, after + below], axis=-1), np.stack([ring, after + below, after], axis=-1)]
+    )
+    points = np.concatenate([low + [0.0, 0.0, thickness], low]).reshape(-1, 3)
+    return surface_from_arrays(points, np.concatenate([upper, upper[:, ::-1] + below, rim]), "plate")
+
+
+def test_a_thin_body_that_a_copy_would_make_another_one_is_fitted_whole(monkeypatch):
+    monkeypatch.setattr(decimation, "MOST_FITTED", 1000)
+    monkeypatch.setattr(decimation, "FITTED", 600)
+    thick, thin = bent_plate(30, 0.05), bent_plate(30, 1e-4)
+    copy, said = decimation.fitted_copy(thick)
+    assert copy.volume == pytest.approx(thick.volume, rel=0.01) and said.startswith("laid out and fitted on a copy")
+    same, said = decimation.fitted_copy(thin)
+    assert same is thin and "the volume of a copy is" in said
+    assert any("than the input's: raise --max-faces" in notice for notice in decimate(thin, 600).notices)

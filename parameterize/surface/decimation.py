@@ -18,14 +18,16 @@ from .surface import Surface, surface_from_arrays
 
 MOST_FITTED = 40_000  # faces: a surface of more is fitted on a copy; below, the copy would hardly be faster
 FITTED = 30_000  # faces of the copy
+_LOST = 0.01  # share of its volume that a body may lose or gain in silence: thin plates lose more
 
 
 def decimate(surface: Surface, max_faces: int) -> Surface:
     """Return the surface with at most `max_faces` triangles, or itself where it has no more.
 
     Edges are collapsed by quadric errors (Garland, Heckbert, SIGGRAPH 1997), and where that makes triangles intersect,
-    once more without the collapses that do. A notice has the counts and the largest distance moved; `sha256` is that of
-    the new arrays. Raises MeshError for a limit below 4, and where the surface cannot be brought below it.
+    once more without the collapses that do. A notice has the counts, the largest distance moved, and the change of the
+    volume if it is large, as of thin bodies; `sha256` is that of the new arrays. Raises MeshError for a limit below 4,
+    and where the surface cannot be brought below it.
     """
     check_face_limit(max_faces)
     before = len(surface.faces)
@@ -33,6 +35,8 @@ def decimate(surface: Surface, max_faces: int) -> Surface:
         return surface
     smaller, moved = _reduced(surface, max_faces)
     notice = f"decimated from {before} to {len(smaller.faces)} faces: moved by at most {moved:.3g} at vertices"
+    if abs(lost := _lost(surface, smaller)) > _LOST:
+        notice += f"; its volume is {_change(lost)} than the input's: raise --max-faces"
     # Earlier notices concern the given surface, later ones the decimated surface.
     return replace(smaller, notices=(*surface.notices, notice, *smaller.notices))
 
@@ -44,6 +48,8 @@ def fitted_copy(surface: Surface) -> tuple[Surface, str]:
         return surface, ""
     try:
         copy, moved = _reduced(surface, FITTED)
+        if abs(lost := _lost(surface, copy)) > _LOST:
+            raise MeshError(f"the volume of a copy is {_change(lost)}")
     except MeshError as error:  # such as a surface that meets itself, whose copy tears
         return surface, f"laid out and fitted with all its {before} faces, which takes long: {error}"
     return replace(copy, sharp=surface.sharp), (
@@ -70,6 +76,15 @@ def _reduced(surface: Surface, max_faces: int) -> tuple[Surface, float]:
             pass  # triangles that meet may end up as one
     vertices, faces, *_ = igl.qslim(*whole, max_faces, block_intersections=True)
     return _checked(surface, vertices, faces, max_faces)
+
+
+def _lost(surface: Surface, smaller: Surface) -> float:
+    """Return the share of the surface's volume that the smaller surface has lost; below zero, gained."""
+    return 1.0 - smaller.volume / surface.volume
+
+
+def _change(lost: float) -> str:
+    return f"{100.0 * abs(lost):.2g} % {'smaller' if lost > 0.0 else 'larger'}"
 
 
 def _checked(surface: Surface, vertices: Array, faces: IntArray, max_faces: int) -> tuple[Surface, float]:
