@@ -52,8 +52,8 @@ def limited():
 
 @pytest.fixture(autouse=True)
 def few_rounds(monkeypatch):
-    monkeypatch.setattr(refinement, "ROUNDS", 2)
-    monkeypatch.setattr(refinement, "POLISH", 1)
+    monkeypatch.setattr(refinement, "ROUNDS", 4)
+    monkeypatch.setattr(refinement, "POLISH", 2)
 
 
 def size_of(spline):

@@ -332,8 +332,9 @@ def test_a_page_around_the_view_hears_which_face_is_clicked_and_where(in_browser
         return await tab.until("window.heard")
 
     heard = in_browser(work)
-    axis, side = "uvw".index(heard["face"][0]), float(heard["face"][1])
-    assert volume.locate([heard["point"]])[0][axis] == pytest.approx(side, abs=0.02)
+    places = np.stack(np.meshgrid(*3 * [np.linspace(0.0, 1.0, 81)], indexing="ij"), axis=-1)
+    on_face = np.take(places, -int(heard["face"][1]), axis="uvw".index(heard["face"][0])).reshape(-1, 3)
+    assert np.linalg.norm(volume(on_face) - heard["point"], axis=1).min() < 0.02  # beside a chord of the picture
 
 
 def test_a_plane_of_space_cuts_the_body_in_its_colours(in_browser, tmp_path):

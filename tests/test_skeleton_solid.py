@@ -128,6 +128,15 @@ def test_a_part_that_is_too_thin_is_named_with_its_place(monkeypatch):
     assert np.linalg.norm(places[0]) > 1.05 * scale and abs(places[0][2]) < 0.03 * scale  # on the wire
 
 
+def test_a_foil_has_no_skeleton_and_says_so_at_once():
+    """A prism over a triangle of height 1e-6: its box has 80 million points at the first resolution."""
+    corners = np.array([[0.0, 0.0], [1.0, 0.0], [0.5, 1e-6]])
+    points = np.concatenate([np.column_stack([corners, np.full(3, z)]) for z in (0.0, 1.0)])
+    faces = [(0, 2, 1), (3, 4, 5), (0, 1, 4), (0, 4, 3), (1, 2, 5), (1, 5, 4), (2, 0, 3), (2, 3, 5)]
+    with pytest.raises(SkeletonError, match="too thin for a lattice: its box is hundreds of times larger"):
+        skeleton_of(points * 5e-7 ** (-1.0 / 3.0), np.array(faces), 0)
+
+
 def test_the_same_surface_has_the_same_bits():
     body = star(AXES[:3])
     first, second = skeleton_of(*body), skeleton_of(*body)

@@ -224,15 +224,17 @@ def row_of(known: Known) -> Row:
     if known.report is None:
         return Row(known.entry.name, known.line)
     report = known.report
-    quality, levels = report["parameterization"], report["poisson"]["levels"]
+    quality, solved_on = report["parameterization"], report.get("poisson", {})
     found: dict[str, Any] = {
         "verdict": quality["bijective"],
         "one_to_one": reports.one_to_one(report),
         "blocks": len(quality.get("patches", ())) or 1,
         "control_points": _control_points(quality["control_points"]),
         "det_lower_bound": quality["det_lower_bound"],
-        "exact": report["poisson"]["exact"],
+        "exact": solved_on.get("exact"),
     }
+    if "not_solved" in report:
+        found["status"] = f"not solved: {report['not_solved']}"
     if found["blocks"] == 1:  # the surface is cut along the edges of a cube alone
         found["flipped_triangles"] = len(BoundaryMap.load(known.entry.folder / "boundary.npz").flipped())
     for scale in ("unit_volume", "as_given"):
@@ -245,7 +247,7 @@ def row_of(known: Known) -> Row:
     for key, value in reports.surface_distance(report).items():
         if key != "mean":
             found[f"distance_{key}"] = value
-    for level, solved in enumerate(levels):
+    for level, solved in enumerate(solved_on.get("levels", ())):
         found |= {f"l2_relative_refine_{level}": solved["l2_relative"], f"l2_refine_{level}": solved["l2"]}
         found[f"iterations_refine_{level}"] = solved["iterations"]
         if not solved["converged"]:

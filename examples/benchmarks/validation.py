@@ -92,7 +92,7 @@ def _run(name: str, options: argparse.Namespace) -> Result:
     command += ["--steps-factor", str(options.steps_factor), "--control-points", str(options.control_points)]
     code = iga_nn_main(command)
     report = read(folder) if code in (0, 3, 4) else None
-    if report is None:
+    if report is None or "poisson" not in report:
         return FAILED
     if blocks_of(name) == 1:
         _draw_figure_14(folder)

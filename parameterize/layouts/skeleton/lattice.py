@@ -16,6 +16,7 @@ from ...surface.solid import Solid, crossed_pairs, inside_of
 FIRST_CELL = 0.04  # at volume 1: 16 000 cells inside, and limbs of a body have radii of .1 and more
 FINER = 2.0**0.5
 MOST_POINTS = 6_000_000  # of the box, at the last level: thinning and distances take some ten seconds there
+MOST_FIRST = 24_000_000  # the same at the first level: frames of wire need it
 LOST = 0.003  # share of the points: crumbs at sharp edges are below, and a part of the body that fell off is above
 _OFFSET = np.array([2.512345, 2.498765, 2.543211])  # in cells: two layers of points outside, none on a model's faces
 _TO_SURFACE = 0.5  # cells: the surface passes halfway between a point inside and the nearest one outside, on average
@@ -58,13 +59,14 @@ class Lattice:
 def lattices(vertices: Array, faces: IntArray, genus: int) -> Iterator[Lattice]:
     """Yield the lattices inside a surface of volume 1, coarse ones first.
 
-    Gaps between parts are kept open where a lattice has not the body's topology without that.
+    Gaps between parts are kept open where a lattice has not the body's topology without that. There is none where the
+    box is so much larger than the body that even the first one has too many points.
     """
     cell = FIRST_CELL
     while True:
         low = vertices.min(axis=0) - cell * _OFFSET
         counts = np.ceil((vertices.max(axis=0) - low) / cell).astype(int) + 3
-        if cell < FIRST_CELL and counts.prod(dtype=float) > MOST_POINTS:
+        if counts.prod(dtype=float) > (MOST_POINTS if cell < FIRST_CELL else MOST_FIRST):
             return
         corners = (vertices[faces] - low) / cell
         inside = inside_of(corners, (counts[0], counts[1], counts[2]))
