@@ -54,7 +54,7 @@ def draw_errors(
             panel.set_title(title, fontsize=13)
         report = solution.report
         label = f"{report.dofs} unknowns, relative L2 error {report.l2_relative:.3e}, L2 error {report.l2:.3e}"
-        row[0].text(0.0, 0.0, label, transform=row[0].transAxes, fontsize=14)
+        row[0].text(0.0, 0.0, label, transform=row[0].transAxes, fontsize=14, in_layout=False)
     color_bar(figure, rows, limits, r"$|u - u_h|$")
     save(figure, path)
 
