@@ -53,8 +53,8 @@ def draw_errors(
             panel.imshow(draw(patches, widest_view(cloud, tilt=0.45 if whole else 0.0), PANEL))
             panel.set_title(title, fontsize=13)
         report = solution.report
-        label = f"{report.dofs} unknowns, relative L2 error {report.l2_relative:.3e}, L2 error {report.l2:.3e}"
-        row[0].text(0.0, 0.0, label, transform=row[0].transAxes, fontsize=14, in_layout=False)
+        label = f"{report.dofs} unknowns\nrelative L2 error {report.l2_relative:.3e}\nL2 error {report.l2:.3e}"
+        row[0].text(0.0, 0.0, label, transform=row[0].transAxes, va="top", fontsize=12)
     color_bar(figure, rows, limits, r"$|u - u_h|$")
     save(figure, path)
 
