@@ -133,7 +133,7 @@ def test_a_foil_has_no_skeleton_and_says_so_at_once():
     corners = np.array([[0.0, 0.0], [1.0, 0.0], [0.5, 1e-6]])
     points = np.concatenate([np.column_stack([corners, np.full(3, z)]) for z in (0.0, 1.0)])
     faces = [(0, 2, 1), (3, 4, 5), (0, 1, 4), (0, 4, 3), (1, 2, 5), (1, 5, 4), (2, 0, 3), (2, 3, 5)]
-    with pytest.raises(SkeletonError, match="too thin for a lattice: its box is hundreds of times larger"):
+    with pytest.raises(SkeletonError, match="too thin: a lattice across it has far too many points"):
         skeleton_of(points * 5e-7 ** (-1.0 / 3.0), np.array(faces), 0)
 
 

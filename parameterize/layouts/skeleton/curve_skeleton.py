@@ -59,7 +59,7 @@ def skeleton_of(vertices: Array, faces: IntArray, genus: int, where: Callable[[A
     if found is not None:
         return found
     if coarse is None:
-        raise SkeletonError("the body is too thin for a lattice: its box is hundreds of times larger; thicken it")
+        raise SkeletonError("the body is too thin: a lattice across it has far too many points; thicken it")
     place = _thinnest(coarse, vertices)
     raise SkeletonError(
         f"a part of the body, or a gap between two parts, is too thin near {where(place)}: of {genus} handles a "

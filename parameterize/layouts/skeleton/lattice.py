@@ -59,8 +59,8 @@ class Lattice:
 def lattices(vertices: Array, faces: IntArray, genus: int) -> Iterator[Lattice]:
     """Yield the lattices inside a surface of volume 1, coarse ones first.
 
-    Gaps between parts are kept open where a lattice has not the body's topology without that. There is none where the
-    box is so much larger than the body that even the first one has too many points.
+    Gaps between parts are kept open where a lattice has not the body's topology without that. There is none of a
+    body so thin, and so wide at volume 1, that even the first one has too many points.
     """
     cell = FIRST_CELL
     while True:
