@@ -12,6 +12,7 @@ import signal
 from collections.abc import Callable, Iterator
 from contextlib import nullcontext
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -228,7 +229,9 @@ def in_folder(
     monkeypatch.setattr("iga_nn.workflow.painter.Painter", nullcontext)
     if request.node.get_closest_marker("pictures") is None:
         monkeypatch.setattr("iga_nn.figures.render.can_draw", lambda: False)
-        monkeypatch.setattr("iga_nn.figures.style.Picture.savefig", lambda _, path, **__: Path(path).touch())
+        monkeypatch.setattr("iga_nn.figures.panels.Picture.savefig", lambda _, path, **__: Path(path).touch())
+        empty = SimpleNamespace(print_png=lambda path, **_: Path(path).touch())
+        monkeypatch.setattr("iga_nn.figures.style.FigureCanvasAgg", lambda _: empty)
     monkeypatch.chdir(tmp_path)
     return tmp_path
 

@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 from matplotlib import colormaps
 from matplotlib.colors import to_hex
-from matplotlib.figure import Figure
 
 import iga_nn
 from iga_nn.figures import palette
 from iga_nn.figures.colors import ColorRange, even_range, joint_range, range_of_most
 from iga_nn.figures.fields import fields_of
+from iga_nn.figures.panels import panels_of
 from iga_nn.figures.style import color_bar
 from iga_nn.report.viewer import scene_of
 from parameterize.spline.volume import BSplineVolume
@@ -55,8 +55,8 @@ def test_fields_of_several_frames_have_one_range():
 
 def test_an_arrow_at_the_bar_says_that_values_lie_beyond():
     for limits, extend in ((even_range(EVEN), "neither"), (most(PEAK), "max"), (most([-PEAK[0]]), "min")):
-        figure = Figure()
-        color_bar(figure, figure.subplots(), limits, "stress", limits.said())
+        figure, _ = panels_of(1, 1)
+        color_bar(figure, limits, "stress", limits.said())
         assert figure.axes[-1]._colorbar.extend == extend
         assert ("99 % of the body" in figure.get_supxlabel()) == limits.is_part
 

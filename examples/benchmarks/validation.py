@@ -22,8 +22,10 @@ import iga_nn
 from iga_nn.cli.commands import main as iga_nn_main
 from iga_nn.figures.colors import error_range
 from iga_nn.figures.fields import SECTIONS, error_of, points_of
-from iga_nn.figures.render import Patch, can_draw, draw, widest_view
-from iga_nn.figures.style import PANEL, color_bar, panels_of, save
+from iga_nn.figures.panels import panels_of
+from iga_nn.figures.render import Patch, can_draw, widest_view
+from iga_nn.figures.solution import write_numbers
+from iga_nn.figures.style import color_bar, save, show
 from iga_nn.report.document import one_to_one, read
 from solve import Solution
 
@@ -43,19 +45,16 @@ def draw_errors(
     """Draw |u - u_h| on the boundary and the three mid-sections, a row per mesh, as the paper's Fig. 14 does."""
     points, fields = points_of(volume).planes, [error_of(volume, solution, problem) for solution in solutions]
     limits = error_range([field.everywhere for field in fields])
-    figure, rows = panels_of(len(solutions), 4)
+    figure, rows = panels_of(len(solutions), 5)
     for row, field, solution in zip(rows, fields, solutions, strict=True):
-        for panel, title, shown in zip(row, ("boundary", *SECTIONS), (slice(6), *range(6, 9)), strict=True):
+        for panel, title, shown in zip(row, ("boundary", *SECTIONS), (slice(6), *range(6, 9)), strict=False):
             whole = isinstance(shown, slice)
             chosen = range(6) if isinstance(shown, slice) else (shown,)
             patches = [Patch(points[i], limits.colors(field.planes[i]), lit=False) for i in chosen]
             cloud = np.concatenate([patch.points.reshape(-1, 3) for patch in patches])
-            panel.imshow(draw(patches, widest_view(cloud, tilt=0.45 if whole else 0.0), PANEL))
-            panel.set_title(title, fontsize=13)
-        report = solution.report
-        label = f"{report.dofs} unknowns\nrelative L2 error {report.l2_relative:.3e}\nL2 error {report.l2:.3e}"
-        row[0].text(0.0, 0.0, label, transform=row[0].transAxes, va="top", fontsize=12)
-    color_bar(figure, rows, limits, r"$|u - u_h|$")
+            show(panel, title, patches, widest_view(cloud, tilt=0.45 if whole else 0.0))
+        write_numbers(row[-1], solution)
+    color_bar(figure, limits, r"$|u - u_h|$")
     save(figure, path)
 
 

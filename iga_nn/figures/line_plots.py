@@ -14,7 +14,8 @@ from solve.solution import LoadStep
 from ..level_table import Study
 from ..options import NO_UNITS, Units
 from .colors import FACE_COLORS, with_unit
-from .style import blank, positive, save
+from .panels import DPI, Picture
+from .style import positive, save
 
 TERMS = {  # of the loss, as parameterize names them
     "arap": "ARAP distortion",
@@ -30,6 +31,8 @@ TERMS = {  # of the loss, as parameterize names them
 TERM_COLORS = tuple(colormaps["tab10"](range(10)))  # a term keeps its colour where another is left out
 LOWEST = 1e-8  # value that is drawn, over the largest loss
 SAME_NORM = 1e-3  # relative: norms of one solution on meshes of different sizes agree better
+LEFT, RIGHT, BELOW, ABOVE = 0.85, 0.95, 0.6, 0.4  # inches beside the axes: of the ticks, their labels and a title
+LEGEND, SLANTED = 2.3, 0.9  # inches: of the terms on the right, of the stages' names above
 STAGES = {"S(2)": "round cuboid S(2)", "S(1)": "sharper cuboid S(1)"}  # the other names need no explanation
 
 
@@ -37,7 +40,8 @@ def draw_history(path: Path | None, history: dict[str, NDArray[Any]]) -> Figure:
     """Draw the loss and its unweighted terms over the steps, the folded samples below, and mark the stages."""
     terms = [name for name in history if name not in ("stage", "step", "loss", "folded")]
     steps = np.arange(len(history["loss"]))
-    figure, (upper, lower) = blank(2, 1, (11, 6), sharex=True, height_ratios=(4, 1))
+    ratios = {"sharex": True, "height_ratios": (4, 1)}
+    figure, (upper, lower) = _blank(2, 1, (11, 6), right=LEGEND, above=SLANTED, between=0.2, **ratios)
     lowest = LOWEST * float(np.nanmax(history["loss"]))
     for name, color in zip(terms, TERM_COLORS * len(terms), strict=False):
         values = positive(history[name])
@@ -70,7 +74,7 @@ def draw_study(path: Path | None, study: Study) -> Figure:
 
     Relative errors are drawn where they are known, with an axis of the absolute ones on the right.
     """
-    figure, panels = blank(1, 2, (11, 5))
+    figure, panels = _blank(1, 2, (11, 5), between=LEFT + RIGHT)
     norms = (("L2", "l2", "l2_relative", 0), ("H1 seminorm", "h1_seminorm", "h1_relative", 1))
     for panel, (title, absolute, relative, lost) in zip(panels, norms, strict=True):
         reports = [level.report for levels in study.values() for level in levels]
@@ -89,7 +93,7 @@ def draw_study(path: Path | None, study: Study) -> Figure:
         panel.set_xticks([1.0 / count for count in counts], [f"1/{count}" for count in counts])
         panel.minorticks_off()
         panel.set_xlabel("h, the edge of an element in the unit cube")
-        panel.set_title(f"{title} error")
+        panel.set_title(f"{title} error", y=1.0)
         panel.set_ylabel("relative" if is_relative else "absolute")
         if is_relative:
             _add_absolute_axis(panel, [(getattr(r, absolute), getattr(r, relative)) for r in reports])
@@ -101,7 +105,7 @@ def draw_study(path: Path | None, study: Study) -> Figure:
 
 def draw_load_steps(path: Path | None, steps: Sequence[LoadStep], units: Units = NO_UNITS) -> Figure:
     """Draw the share of the load over the largest displacement, a point for each load step, from rest on."""
-    figure, axes = blank(1, 1, (7, 5))
+    figure, axes = _blank(1, 1, (7, 5), right=0.2)
     moved, shares = ([0.0, *(getattr(step, name) for step in steps)] for name in ("displacement", "factor"))
     axes.plot(moved, shares, "o-", color=FACE_COLORS[0], markersize=4.0)
     axes.axhline(1.0, color="grey", linewidth=0.7, linestyle=":")
@@ -111,6 +115,25 @@ def draw_load_steps(path: Path | None, steps: Sequence[LoadStep], units: Units =
     axes.set_ylim(bottom=0.0)
     axes.grid(alpha=0.3)
     return save(figure, path)
+
+
+def _blank(
+    rows: int,
+    columns: int,
+    inches: tuple[float, float],
+    *,
+    right: float = RIGHT,
+    above: float = ABOVE,
+    between: float = 0.0,
+    **ratios: Any,
+) -> tuple[Figure, Any]:
+    """Return an empty figure and its axes. right, above, between: inches that the axes leave free, for texts."""
+    width, height = inches
+    across, down = (width - LEFT - right + between) / columns - between, (height - BELOW - above + between) / rows
+    place = {"left": LEFT / width, "right": 1.0 - right / width, "bottom": BELOW / height, "top": 1.0 - above / height}
+    figure = Picture(figsize=inches, dpi=DPI)
+    space = {"wspace": between / across, "hspace": between / (down - between)}
+    return figure, figure.subplots(rows, columns, gridspec_kw=place | space, **ratios)
 
 
 def _add_absolute_axis(panel: Any, errors: Sequence[tuple[float, float]]) -> None:

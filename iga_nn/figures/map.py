@@ -26,8 +26,9 @@ from .fields import (
     points_of,
     points_on,
 )
+from .panels import panels_of
 from .render import NAMELESS, Patch, check_drawable, plain_patch, view_of
-from .style import color_bar, name_colors, panels_of, save, show, show_around, show_inside
+from .style import color_bar, name_colors, save, show, show_around, show_inside
 
 LINES = 10  # from one side of the cube to the other, with the last
 WINDOW = 0.15  # of the cube, on every side of a meeting place
@@ -97,7 +98,7 @@ def draw_cut(path: str | Path | None, body: BodyLike) -> Figure:
     ):
         show(panel, "", visible(body, painted, left_out), view)
     name_colors(figure, body)
-    color_bar(figure, panels, field.limits, field.title)
+    color_bar(figure, field.limits, field.title)
     if not as_body(body).is_single:
         return save(figure, path, "Cut open: the upper octants of the patches, towards the viewer, are left out")
     u, v, w = np.argwhere(left_out[0])[0].tolist()
@@ -112,7 +113,7 @@ def draw_distortion(path: str | Path | None, body: BodyLike) -> Figure:
     figure, (panels,) = panels_of(1, 3)
     field, points = distortion_of(body), points_of(body)
     show_inside(panels, body, points, Painted(points, field))
-    color_bar(figure, panels, field.limits, field.title)
+    color_bar(figure, field.limits, field.title)
     is_single = as_body(body).is_single
     return save(figure, path, "Distortion on the mid-sections" if is_single else "Distortion of the patches inside")
 
@@ -150,7 +151,7 @@ def _draw_many(path: str | Path | None, body: Body) -> Figure:
     figure, (panels,) = panels_of(1, 2)
     show(panels[0], "the blocks", painted.at(outer_faces(body)), view)
     show(panels[1], "cut open", visible(body, painted, left_out), view)
-    color_bar(figure, panels, limits, f"mean of {field.title}")
+    color_bar(figure, limits, f"mean of {field.title}")
     return save(figure, path, f"{len(body):,} blocks, {len(body.interfaces):,} interfaces")
 
 

@@ -18,9 +18,10 @@ from .colors import region_colors
 from .fields import outer_faces, points_of
 from .first_view import best_sides, shown_from
 from .outline import edge_patch, outline_of
+from .panels import panels_of
 from .region_numbers import first_of, numbers_of
 from .render import Patch, View
-from .style import panels_of, save, show, show_around
+from .style import name_below, save, show, show_around
 
 MOST_PANELS, COLUMNS = 9, 3  # pictures of regions
 GLASS = 0.18  # opacity of a body around a region that is hidden
@@ -28,6 +29,7 @@ CELLS = 40_000  # of a surface: large triangles are divided into as many
 FINEST = 100  # cells along a side of a triangle
 LINES_UP_TO = 3_000  # triangles: surfaces with more are drawn without outlines
 LONGEST = 60  # letters of a name
+FITTING = 36  # letters that are as wide as a panel
 
 
 def draw_conditions(path: str | Path | None, body: BodyLike, conditions: Sequence[Condition]) -> Figure:
@@ -48,8 +50,8 @@ def draw_conditions(path: str | Path | None, body: BodyLike, conditions: Sequenc
     for number, (panel, name, (view, is_seen)) in enumerate(zip(axes.flat, names, sides, strict=False)):
         patches = [Patch(points, palette[numbers])] if is_seen else _through(points, numbers, number, palette)
         show(panel, "", [*patches, edges], view)
-        swatch = Swatch(color=palette[number], label=_short(name))
-        panel.legend(handles=[swatch], loc="lower center", bbox_to_anchor=(0.5, 1.0), frameon=False, fontsize=13)
+        swatch, size = Swatch(color=palette[number], label=_short(name)), 13 * min(1.0, FITTING / len(_short(name)))
+        panel.legend(handles=[swatch], loc="lower center", bbox_to_anchor=(0.5, 1.0), frameon=False, fontsize=size)
     return save(figure, path)
 
 
@@ -111,5 +113,5 @@ def _draw(
     figure, (panels,) = panels_of(1, 2)
     show_around(panels, patches, unit=unit, view=view)
     swatches = [Swatch(color=color, label=_short(name)) for color, name in zip(palette, names, strict=False)]
-    figure.legend(handles=swatches, loc="outside lower center", ncols=2, frameon=False, fontsize=12)
+    name_below(figure, swatches, 2)
     return save(figure, path, title)

@@ -34,8 +34,9 @@ from .fields import (
 )
 from .first_view import shown_from
 from .outline import edge_patch, outline_of
+from .panels import panels_of
 from .render import TILT, Patch, View, check_drawable, widest_view
-from .style import color_bar, panels_of, save, show, show_around, show_inside
+from .style import color_bar, save, show, show_around, show_inside
 
 MOST, COLUMNS = 6, 3  # modes
 MODE_SAMPLES = 61  # a direction of a face
@@ -58,9 +59,9 @@ def draw_error(
     figure, rows = panels_of(2, 3)
     painted = Painted(points, field, lines_of(body, 1))
     show_around(rows[0][:2], painted.at(outer_faces(body)), view=shown_from(body, solution))
-    _write_numbers(rows[0][2], solution)
+    write_numbers(rows[0][2], solution)
     show_inside(rows[1], body, points, painted)
-    color_bar(figure, rows, field.limits, with_unit(r"$|u - u_h|$", units.displacement))
+    color_bar(figure, field.limits, with_unit(r"$|u - u_h|$", units.displacement))
     where = "on the mid-sections" if as_body(body).is_single else "inside"
     return save(figure, path, f"Error on the boundary and {where}")
 
@@ -126,7 +127,7 @@ def _draw_values(
     halved = replace(painted, lines=lines_of(body, 2) if are_few else 0)  # lines along the cut, too
     show(rows[0][2], "cut open", visible(body, halved, left_out), view)
     show_inside(rows[1], body, at_rest, painted)
-    color_bar(figure, rows, field.limits, field.titled(units), field.said(units))
+    color_bar(figure, field.limits, field.titled(units), field.said(units))
     return save(figure, path, heading)
 
 
@@ -161,7 +162,8 @@ def plot_solution(solution: Solution, what: str, file: str | Path | None) -> Fig
     return draw_solution(file, solution.body, solution)
 
 
-def _write_numbers(panel: Any, solution: Solution) -> None:
+def write_numbers(panel: Any, solution: Solution) -> None:
+    """Write the unknowns and the errors of a solution on a panel."""
     report = solution.report
     errors = [(TITLES[key], getattr(report, key)) for key in EXACT_ERRORS]
     lines = [f"{report.dofs:,} unknowns"]

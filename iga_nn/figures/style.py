@@ -1,6 +1,5 @@
 """Holds the parts that figures share: the blank figure of matplotlib, rendered views on it, colours, the file."""
 
-import io
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -24,37 +23,11 @@ from .cutaway import Painted, beyond, visible
 from .fields import SECTIONS, Samples
 from .outline import is_by_face
 from .palette import MAP
+from .panels import PANEL, Panels
 from .render import NAMELESS, Patch, View, draw, plain_patch, view_of, widest_view
 
 PACKED = 4  # of 9: 2 % larger files than by 6 in two thirds of the time
-PANEL = (720, 560)  # pixels of one view
-NOTEBOOK_DPI = 72  # in a notebook a figure is as wide as the text
 UP, ASIDE = 0.4, 0.25  # of a viewer in front of a cut: shows more than one side of what is left
-
-
-class Picture(Figure):
-    """A figure outside pyplot, which need not be closed; a notebook shows it as the last value of a cell."""
-
-    def _repr_png_(self) -> bytes:
-        stream = io.BytesIO()
-        self.savefig(stream, format="png", dpi=NOTEBOOK_DPI)
-        return stream.getvalue()
-
-
-def blank(rows: int, columns: int, inches: tuple[float, float], **grid: Any) -> tuple[Figure, Any]:
-    """Return an empty figure and its axes, outside pyplot: it asks for no window system."""
-    figure = Picture(figsize=inches, dpi=110, layout="constrained")
-    return figure, figure.subplots(rows, columns, **grid)
-
-
-def panels_of(rows: int, columns: int) -> tuple[Figure, Any]:
-    """Return a figure of empty panels for rendered views, and its axes (rows, columns)."""
-    figure, axes = blank(rows, columns, (4.6 * columns, 3.8 * rows + 0.8), squeeze=False)
-    for panel in axes.flat:
-        panel.set_axis_off()
-        for axis in (panel.xaxis, panel.yaxis):  # else the layout measures the ticks that are not drawn
-            axis.set_visible(False)
-    return figure, axes
 
 
 def show(
@@ -68,7 +41,7 @@ def show(
 ) -> None:
     """Draw patches on a panel under a title. marks, names, unit: as in `draw`."""
     panel.imshow(draw(patches, view, PANEL, marks, names, unit))
-    panel.set_title(title, fontsize=13)
+    panel.set_title(title, fontsize=13, y=1.0)  # a given place is not looked for
 
 
 def draws() -> bool:
@@ -121,28 +94,35 @@ def _alignment(direction: Array) -> View:
     return View(right, np.cross(towards, right), towards)
 
 
-def name_colors(figure: Figure, body: BodyLike) -> None:
+def name_colors(figure: Panels, body: BodyLike) -> None:
     """Write the legend of the colours of a volume's faces, or of several patches, below the panels."""
     swatches = [Swatch(color=color, label=label) for color, label in color_labels(body)]
     if is_by_face(body):
-        figure.supxlabel(f"{len(as_body(body)):,} patches: each colour is a face between sharp edges", fontsize=12)
-    if not swatches:
-        return
+        said = f"{len(as_body(body)):,} patches: each colour is a face between sharp edges"
+        figure.line = figure.supxlabel(said, fontsize=12)
+    if swatches:
+        name_below(figure, swatches, 6 if len(swatches) <= 6 else 10)
+
+
+def name_below(figure: Panels, swatches: Sequence[Swatch], columns: int) -> None:
+    """Write a legend below the panels, in so many columns."""
+    figure.rows_of_legend = -(-len(swatches) // columns)
     figure.legend(
         handles=swatches,
-        loc="outside lower center",
-        ncols=6 if len(swatches) <= 6 else 10,
+        loc="lower center",
+        ncols=columns,
         frameon=False,
         fontsize=12,
         columnspacing=1.2,
         handlelength=1.4,
+        borderpad=0.0,
     )
 
 
 EXTEND = {(False, False): "neither", (True, False): "min", (False, True): "max", (True, True): "both"}
 
 
-def color_bar(figure: Figure, panels: Any, limits: ColorRange, title: str, said: str = "") -> None:
+def color_bar(figure: Panels, limits: ColorRange, title: str, said: str = "") -> None:
     """Draw one colour bar to the right of all panels; for a field of one value it has one colour and says the value.
 
     Arrows say that values outside of the range have the colours of its ends. said: a line of text on the range.
@@ -151,10 +131,11 @@ def color_bar(figure: Figure, panels: Any, limits: ColorRange, title: str, said:
     below = limits.logarithmic or limits.below is not None  # smaller values have the lowest colour
     extend = EXTEND[below, limits.beyond is not None]
     if said:
-        figure.supxlabel(f"colours: {said}", fontsize=11)
-    bar = figure.colorbar(ScalarMappable(limits.norm(), shades), ax=panels, shrink=0.85, aspect=28, extend=extend)
+        figure.line = figure.supxlabel(f"colours: {said}", fontsize=11)
+    figure.bar = figure.add_axes((0.9, 0.1, 0.1, 0.8))
+    bar = figure.colorbar(ScalarMappable(limits.norm(), shades), cax=figure.bar, extend=extend)
     if limits.remark:
-        bar.set_ticks([0.5], labels=[limits.remark])
+        bar.set_ticks([0.5], labels=[limits.remark], rotation="vertical", verticalalignment="center")
     bar.set_label(title, fontsize=13)
 
 
@@ -166,8 +147,9 @@ def positive(values: NDArray[Any]) -> Array:
 
 def save(figure: Figure, path: str | Path | None, title: str = "") -> Figure:
     """Write the figure as PNG or PDF, by the ending of the path, and return it; atomic. None: only return it."""
-    if title:
-        figure.suptitle(title, fontsize=14)
+    if isinstance(figure, Panels):
+        figure.heading = figure.suptitle(title, fontsize=14) if title else None
+        figure.arrange()
     if path is not None:
         with replacing(Path(path)) as temporary:
             if Path(path).suffix == ".png":

@@ -1,0 +1,31 @@
+"""Places of views, texts and colour bars on a figure."""
+
+import numpy as np
+import pytest
+from matplotlib.patches import Patch as Swatch
+
+from iga_nn.figures.colors import ColorRange
+from iga_nn.figures.panels import VIEW, panels_of
+from iga_nn.figures.style import color_bar, name_below, save
+
+WIDE = ColorRange(-1.234567e-5, 2.345678e-5, beyond=1.0)
+EVEN = ColorRange(0.0, 1.0, remark="below 1e-200 everywhere")
+MANY = ColorRange(1e-12, 1e-3, logarithmic=True)
+
+
+@pytest.mark.parametrize("limits", [None, WIDE, EVEN, MANY])
+@pytest.mark.parametrize(("rows", "columns"), [(1, 1), (1, 2), (2, 3)])
+def test_no_text_leaves_the_figure_and_no_view_changes_its_size(rows, columns, limits):
+    figure, panels = panels_of(rows, columns)
+    for panel in panels.flat:
+        panel.imshow(np.zeros((56, 72, 3)))
+        panel.set_title("front", fontsize=13, y=1.0)
+    name_below(figure, [Swatch(label=f"p{k}, p{k + 20}") for k in range(3 * columns)], 3)
+    if limits is not None:
+        color_bar(figure, limits, "von Mises stress [N/mm²]", limits.said("N/mm²"))
+    save(figure, None, "The deformed body: displacements, at most 0.04, are drawn 8 times as large")
+    width, height = figure.get_size_inches()
+    drawn = figure.get_tightbbox()
+    assert drawn.x0 >= 0.0 and drawn.y0 >= 0.0 and drawn.x1 <= width and drawn.y1 <= height
+    places = [panel.get_position() for panel in panels.flat]
+    assert np.allclose([(place.width * width, place.height * height) for place in places], VIEW)
