@@ -7,22 +7,33 @@ DEV := .venv/.dev
 unexport PYTHONDONTWRITEBYTECODE
 INSTALL := $(BIN)/python -m pip install --no-compile -c constraints.txt
 
-.PHONY: setup setup-dev demo docs test suite lint validate stress fuzz audit disturbed
+.PHONY: setup setup-dev packages first-kernels kernels bytecode demo docs test suite lint validate stress fuzz audit disturbed
 
 setup: $(RUN)
 
 setup-dev: $(DEV)
 
 # What running needs. An environment that is there is kept. Files that no run loads are removed. The kernels are compiled
-# ahead of the first run, which would wait for them.
+# ahead of the first run, which would wait for them: some while pip installs what they do not need.
 $(RUN): pyproject.toml constraints.txt
 	$(PYTHON) -c 'import sys; sys.exit("Python 3.11 or newer is needed, this is " + sys.version) if sys.version_info < (3, 11) else None'
 	test -x $(BIN)/python || $(PYTHON) -m venv .venv
+	$(INSTALL) libigl numba safetensors scipy threadpoolctl
+	$(MAKE) --jobs 2 kernels bytecode
+	touch $@
+
+packages:
 	$(INSTALL) -e .
 	$(BIN)/python -P .ci/trim.py
+
+first-kernels:
+	$(BIN)/python -m iga_nn.compile_kernels growth
+
+kernels: packages
+	$(BIN)/python -P -m iga_nn.compile_kernels network
+
+bytecode: packages first-kernels
 	$(BIN)/python -P -c 'import iga_nn.cli.commands, jinja2, matplotlib.pyplot, pyvista.plotting, trimesh'
-	$(BIN)/python -P -m iga_nn.compile_kernels
-	touch $@
 
 # The development tools and the extras on top of it: pip leaves alone what is there.
 $(DEV): $(RUN)

@@ -1,5 +1,11 @@
-"""Compiles, in two processes, the kernels of a usual run ahead of the first one: `python -m iga_nn.compile_kernels`."""
+"""Compiles the kernels of a usual run ahead of the first one: `python -m iga_nn.compile_kernels`.
 
+It does so in two processes. `network` or `growth` after the command names one of the two alone: `growth` needs few
+packages and no torch, so `make` runs it while pip installs the others.
+"""
+
+import sys
+from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from multiprocessing import get_context
@@ -7,21 +13,21 @@ from multiprocessing import get_context
 import iga_nn
 
 
-def train_and_certify() -> None:
+def network() -> None:
     """Map a body with the network."""
     _map("network")
 
 
-def solve_and_grow() -> None:
-    """Solve on a volume, with all that a report tells of a solution; then map a body without the network.
-
-    By then the other process has compiled most of what both maps need.
-    """
+def growth() -> None:
+    """Solve on a volume, with all that a report tells of a solution; then map a body without the network."""
     volume = iga_nn.BSplineVolume.from_function(lambda u, v, w: (u + 2 * v + v * w, v, w))
     iga_nn.certify(volume)
     solution = iga_nn.solve(volume, iga_nn.Poisson(exact="exp(X+Z)*sin(Y)"), refine=1)
     solution.all_extremes()
     _map("growth")
+
+
+PARTS = {"network": network, "growth": growth}
 
 
 def _map(way: str) -> None:
@@ -31,12 +37,12 @@ def _map(way: str) -> None:
     iga_nn.parameterize(iga_nn.sample("bean"), config, ways=way)
 
 
-def main() -> None:
-    """Run both."""
-    with ProcessPoolExecutor(2, mp_context=get_context("spawn")) as pool:
-        for done in [pool.submit(train_and_certify), pool.submit(solve_and_grow)]:
+def main(names: Sequence[str]) -> None:
+    """Run the named parts, by default both, each in a process of its own."""
+    with ProcessPoolExecutor(len(PARTS), mp_context=get_context("spawn")) as pool:
+        for done in [pool.submit(PARTS[name]) for name in names or PARTS]:
             done.result()
 
 
 if __name__ == "__main__":
-    main()
+    main(sys.argv[1:])
