@@ -19,7 +19,7 @@ from .space import TrialSpace
 from .stack import PatchStack, Piece, Stacked, stacks_of
 
 PLANES = 16  # of points of u, in a piece of work
-POINTS = 2**15  # of a plane that are evaluated at once: their arrays fit into a processor's cache
+POINTS = 2**16  # of a plane that are evaluated at once: with fewer, threads wait for each other too often
 
 
 Exact = Callable[[Array], tuple[Array, Array | None]]
