@@ -266,13 +266,12 @@ def _draw(state: RunFolder, body: BodyLike, done: Levels, problem: BoundaryValue
     assert done.finest is not None
     if not is_finite(done.finest):
         return
-    if problem.exact is not None and len(done.reports) > 1:
-        rows = [ConvergenceRow(report, None, None) for report in done.reports]
-        levels = {max(max(field.degrees) for field in done.finest.patches): rows}
-        state.draw("solution", levels=levels)  # first, for it needs no samples: they are taken meanwhile
     known: dict[str, Any] = {"volume": body, "solution": done.finest, "units": units}
     if problem.exact is not None:
         known["problem"] = problem
+        if len(done.reports) > 1:
+            rows = [ConvergenceRow(report, None, None) for report in done.reports]
+            known["levels"] = {max(max(field.degrees) for field in done.finest.patches): rows}
     if steps := done.reports[-1].load_steps:
         known["load_steps"] = steps
     if problem.conditions:
