@@ -10,12 +10,17 @@ from iga_nn.figures.style import color_bar, name_below, save
 
 WIDE = ColorRange(-1.234567e-5, 2.345678e-5, beyond=1.0)
 EVEN = ColorRange(0.0, 1.0, remark="below 1e-200 everywhere")
+HEADINGS = (
+    "The deformed body: displacements, at most 0.04, are drawn 8 times as large",
+    "The lowest modes, coloured by their displacement",
+)
 MANY = ColorRange(1e-12, 1e-3, logarithmic=True)
 
 
+@pytest.mark.parametrize("heading", HEADINGS)
 @pytest.mark.parametrize("limits", [None, WIDE, EVEN, MANY])
 @pytest.mark.parametrize(("rows", "columns"), [(1, 1), (1, 2), (2, 3)])
-def test_no_text_leaves_the_figure_and_no_view_changes_its_size(rows, columns, limits):
+def test_no_text_leaves_the_figure_and_no_view_changes_its_size(rows, columns, limits, heading):
     figure, panels = panels_of(rows, columns)
     for panel in panels.flat:
         panel.imshow(np.zeros((56, 72, 3)))
@@ -23,7 +28,7 @@ def test_no_text_leaves_the_figure_and_no_view_changes_its_size(rows, columns, l
     name_below(figure, [Swatch(label=f"p{k}, p{k + 20}") for k in range(3 * columns)], 3)
     if limits is not None:
         color_bar(figure, limits, "von Mises stress [N/mm²]", limits.said("N/mm²"))
-    save(figure, None, "The deformed body: displacements, at most 0.04, are drawn 8 times as large")
+    save(figure, None, heading)
     width, height = figure.get_size_inches()
     drawn = figure.get_tightbbox()
     assert drawn.x0 >= 0.0 and drawn.y0 >= 0.0 and drawn.x1 <= width and drawn.y1 <= height

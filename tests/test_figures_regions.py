@@ -45,6 +45,15 @@ def test_conditions_on_a_solid_have_their_shares_of_its_faces(drawn):
     assert np.all(drawn[0][0].colors[0] == figures.region_colors(3)[0])  # u0 is the first face
 
 
+@pytest.mark.parametrize("region", ["nz > 0.9", "nz > 0.99 and sqrt(x**2 + y**2) < 0.25 and abs(x - y) < 0.125"])
+def test_the_names_of_conditions_fit_on_their_figure(drawn, region):
+    grid = np.stack(np.meshgrid(*[np.linspace(0, 1, 4)] * 3, indexing="ij"), axis=-1)
+    body = iga_nn.Elasticity(fix="u0", load={region: ("0", "0", "1")})
+    figure = figures.draw_conditions(None, iga_nn.BSplineVolume.uniform(grid), body.conditions)
+    names = [panel.get_legend().get_window_extent() for panel in figure.axes]
+    assert names[0].x1 <= names[1].x0 and names[0].y1 <= figure.bbox.y1 and names[1].x1 <= figure.bbox.x1
+
+
 def test_conditions_on_blocks_know_their_own_faces(drawn):
     """Of four blocks in a ring one face is named, and the upper face of each."""
     body = ring(4)

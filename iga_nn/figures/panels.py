@@ -12,7 +12,7 @@ VIEW = (4.0, 4.0 * PANEL[1] / PANEL[0])  # inches of one view
 GAP, TITLE, HEADING, LINE, ROW, BAR = 0.15, 0.32, 0.4, 0.32, 0.28, 1.4  # inches; ROW of a legend
 BAR_PLACE = (0.3, 0.2)  # inches of a colour bar: its distance from the views, its width
 BAR_LENGTH = 0.85  # of the views' height
-LETTER = 0.1  # inches of a heading
+LETTER = 0.115  # inches of a heading
 NOTEBOOK_DPI = 72  # in a notebook a figure is as wide as the text
 
 

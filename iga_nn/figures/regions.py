@@ -51,7 +51,8 @@ def draw_conditions(path: str | Path | None, body: BodyLike, conditions: Sequenc
         patches = [Patch(points, palette[numbers])] if is_seen else _through(points, numbers, number, palette)
         show(panel, "", [*patches, edges], view)
         swatch, size = Swatch(color=palette[number], label=_short(name)), 13 * min(1.0, FITTING / len(_short(name)))
-        panel.legend(handles=[swatch], loc="lower center", bbox_to_anchor=(0.5, 1.0), frameon=False, fontsize=size)
+        place = {"loc": "lower center", "bbox_to_anchor": (0.5, 1.0), "borderpad": 0.0, "borderaxespad": 0.2}
+        panel.legend(handles=[swatch], frameon=False, fontsize=size, **place)
     return save(figure, path)
 
 
