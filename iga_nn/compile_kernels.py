@@ -12,6 +12,8 @@ from multiprocessing import get_context
 
 import iga_nn
 
+from .cli import BAD_INPUT
+
 
 def network() -> None:
     """Map a body with the network."""
@@ -39,6 +41,9 @@ def _map(way: str) -> None:
 
 def main(names: Sequence[str]) -> None:
     """Run the named parts, by default both, each in a process of its own."""
+    if unknown := [name for name in names if name not in PARTS]:
+        sys.stderr.write(f"compile_kernels: unknown part {unknown[0]!r}; the parts are {', '.join(PARTS)}\n")
+        sys.exit(BAD_INPUT)
     with ProcessPoolExecutor(len(PARTS), mp_context=get_context("spawn")) as pool:
         for done in [pool.submit(PARTS[name]) for name in names or PARTS]:
             done.result()

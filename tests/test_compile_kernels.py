@@ -6,6 +6,8 @@ import sys
 
 import pytest
 
+from iga_nn.compile_kernels import main
+
 SMALL = ("--control-points", "10", "--steps-factor", "0.1")
 
 
@@ -18,3 +20,9 @@ def test_a_usual_run_compiles_nothing_after_it(body, tmp_path):
     run = subprocess.run(command, env=environment, capture_output=True, text=True)
     assert run.returncode in (0, 3), run.stderr
     assert "compiling kernels" not in run.stderr
+
+
+def test_an_unknown_part_is_refused_in_one_line(capsys):
+    with pytest.raises(SystemExit) as ended:
+        main(["everything"])
+    assert ended.value.code == 2 and capsys.readouterr().err.count("\n") == 1

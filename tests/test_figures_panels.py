@@ -17,6 +17,15 @@ HEADINGS = (
 MANY = ColorRange(1e-12, 1e-3, logarithmic=True)
 
 
+@pytest.mark.parametrize("name", ["p3, p23", "Open CASCADE STEP translator 7.8 5.1"])
+def test_a_legend_of_long_names_fits_on_the_figure(name):
+    figure, _ = panels_of(1, 2)
+    name_below(figure, [Swatch(label=name)] * 12, 4)
+    save(figure, None, HEADINGS[0])
+    drawn, (width, _) = figure.get_tightbbox(), figure.get_size_inches()
+    assert drawn.x0 >= 0.0 and drawn.x1 <= width
+
+
 @pytest.mark.parametrize("heading", HEADINGS)
 @pytest.mark.parametrize("limits", [None, WIDE, EVEN, MANY])
 @pytest.mark.parametrize(("rows", "columns"), [(1, 1), (1, 2), (2, 3)])

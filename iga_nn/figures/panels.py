@@ -12,7 +12,7 @@ VIEW = (4.0, 4.0 * PANEL[1] / PANEL[0])  # inches of one view
 GAP, TITLE, HEADING, LINE, ROW, BAR = 0.15, 0.32, 0.4, 0.32, 0.28, 1.4  # inches; ROW of a legend
 BAR_PLACE = (0.3, 0.2)  # inches of a colour bar: its distance from the views, its width
 BAR_LENGTH = 0.85  # of the views' height
-LETTER = 0.115  # inches of a heading
+LETTER, SWATCH = 0.115, 0.6  # inches, at most: of a letter of a heading, and of a legend's patch with what is around it
 NOTEBOOK_DPI = 72  # in a notebook a figure is as wide as the text
 
 
@@ -35,7 +35,7 @@ class Panels(Picture):
     def __init__(self, rows: int, columns: int) -> None:
         super().__init__(dpi=DPI)
         self.panels = self.subplots(rows, columns, squeeze=False)
-        self.rows_of_legend = 0
+        self.rows_of_legend, self.legend_width = 0, 0.0
         self.heading: Any = None
         self.line: Any = None  # of text, below all
         self.bar: Any = None  # the axes of the colour bar
@@ -49,7 +49,7 @@ class Panels(Picture):
         above, line = HEADING * (self.heading is not None), LINE * (self.line is not None)
         below, beside = GAP + line + ROW * self.rows_of_legend, BAR if self.bar is not None else 0.0
         letters = max((len(text.get_text()) for text in (self.heading, self.line) if text is not None), default=0)
-        aside = max(GAP, 0.5 * (LETTER * letters - views))
+        aside = max(GAP, 0.5 * (max(LETTER * letters, self.legend_width) - views))
         width, height = aside + views + max(aside, beside), above + down + below
         self.set_size_inches(width, height)
         for (row, column), panel in np.ndenumerate(self.panels):

@@ -23,7 +23,7 @@ from .cutaway import Painted, beyond, visible
 from .fields import SECTIONS, Samples
 from .outline import is_by_face
 from .palette import MAP
-from .panels import PANEL, Panels
+from .panels import LETTER, PANEL, SWATCH, Panels
 from .render import NAMELESS, Patch, View, draw, plain_patch, view_of, widest_view
 
 PACKED = 4  # of 9: 2 % larger files than by 6 in two thirds of the time
@@ -106,7 +106,9 @@ def name_colors(figure: Panels, body: BodyLike) -> None:
 
 def name_below(figure: Panels, swatches: Sequence[Swatch], columns: int) -> None:
     """Write a legend below the panels, in so many columns."""
+    longest = max(len(str(swatch.get_label())) for swatch in swatches)
     figure.rows_of_legend = -(-len(swatches) // columns)
+    figure.legend_width = min(columns, len(swatches)) * (SWATCH + LETTER * longest)
     figure.legend(
         handles=swatches,
         loc="lower center",
