@@ -17,11 +17,12 @@ setup-dev: $(DEV)
 # ahead of the first run, which would wait for them: some while pip installs what they do not need.
 $(RUN): pyproject.toml constraints.txt
 	$(PYTHON) -c 'import sys; sys.exit("Python 3.11 or newer is needed, this is " + sys.version) if sys.version_info < (3, 11) else None'
-	test -x $(BIN)/python || $(PYTHON) -m venv .venv
+	test -x $(BIN)/pip || $(PYTHON) -m venv .venv
 	$(INSTALL) libigl numba safetensors scipy threadpoolctl
 	$(MAKE) --jobs 2 kernels bytecode
 	touch $@
 
+# Parts of this set-up.
 packages:
 	$(INSTALL) -e .
 	$(BIN)/python -P .ci/trim.py

@@ -8,7 +8,7 @@ from iga_nn.figures.colors import ColorRange
 from iga_nn.figures.panels import VIEW, panels_of
 from iga_nn.figures.style import color_bar, name_below, save
 
-WIDE = ColorRange(-1.234567e-5, 2.345678e-5, beyond=1.0)
+WIDE = ColorRange(-123456.789, 234567.8, beyond=1e6)
 EVEN = ColorRange(0.0, 1.0, remark="below 1e-200 everywhere")
 HEADINGS = (
     "The deformed body: displacements, at most 0.04, are drawn 8 times as large",
@@ -36,10 +36,16 @@ def test_no_text_leaves_the_figure_and_no_view_changes_its_size(rows, columns, l
         panel.set_title("front", fontsize=13, y=1.0)
     name_below(figure, [Swatch(label=f"p{k}, p{k + 20}") for k in range(3 * columns)], 3)
     if limits is not None:
-        color_bar(figure, limits, "von Mises stress [N/mm²]", limits.said("N/mm²"))
+        color_bar(figure, limits, "mean of tanh(√ARAP / 2), each in its own box", limits.said("N/mm²"))
     save(figure, None, heading)
     width, height = figure.get_size_inches()
     drawn = figure.get_tightbbox()
     assert drawn.x0 >= 0.0 and drawn.y0 >= 0.0 and drawn.x1 <= width and drawn.y1 <= height
     places = [panel.get_position() for panel in panels.flat]
     assert np.allclose([(place.width * width, place.height * height) for place in places], VIEW)
+
+
+def test_a_figure_without_an_ending_is_refused(tmp_path):
+    figure, _ = panels_of(1, 1)
+    with pytest.raises(ValueError, match=r"\.png or \.pdf"):
+        save(figure, tmp_path / "figure")

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from matplotlib import colormaps
 from matplotlib.figure import Figure
+from matplotlib.ticker import NullLocator
 from numpy.typing import NDArray
 
 from solve.solution import LoadStep
@@ -91,7 +92,7 @@ def draw_study(path: Path | None, study: Study) -> Figure:
             panel.annotate(f"slope {order}", (sizes[-1], reference[-1]), (0, -12), **label)
         counts = sorted({round(level.report.elements ** (1.0 / 3.0)) for levels in study.values() for level in levels})
         panel.set_xticks([1.0 / count for count in counts], [f"1/{count}" for count in counts])
-        panel.minorticks_off()
+        panel.xaxis.set_minor_locator(NullLocator())
         panel.set_xlabel("h, the edge of an element in the unit cube")
         panel.set_title(f"{title} error", y=1.0)
         panel.set_ylabel("relative" if is_relative else "absolute")

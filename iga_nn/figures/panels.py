@@ -5,14 +5,15 @@ from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.text import Text
 
 PANEL = (720, 560)  # pixels of one view
 DPI = 110
 VIEW = (4.0, 4.0 * PANEL[1] / PANEL[0])  # inches of one view
-GAP, TITLE, HEADING, LINE, ROW, BAR = 0.15, 0.32, 0.4, 0.32, 0.28, 1.4  # inches; ROW of a legend
+GAP, TITLE, HEADING, LINE, ROW, BAR = 0.15, 0.32, 0.4, 0.32, 0.28, 1.7  # inches; ROW of a legend
 BAR_PLACE = (0.3, 0.2)  # inches of a colour bar: its distance from the views, its width
 BAR_LENGTH = 0.85  # of the views' height
-LETTER, SWATCH = 0.115, 0.6  # inches, at most: of a letter of a heading, and of a legend's patch with what is around it
+LETTER, SWATCH = 8.2e-3, 0.6  # inches, at most: of a letter a point of its size; of a legend's patch and what is around
 NOTEBOOK_DPI = 72  # in a notebook a figure is as wide as the text
 
 
@@ -48,8 +49,8 @@ class Panels(Picture):
         views, down = columns * (VIEW[0] + GAP) - GAP, rows * (VIEW[1] + TITLE)
         above, line = HEADING * (self.heading is not None), LINE * (self.line is not None)
         below, beside = GAP + line + ROW * self.rows_of_legend, BAR if self.bar is not None else 0.0
-        letters = max((len(text.get_text()) for text in (self.heading, self.line) if text is not None), default=0)
-        aside = max(GAP, 0.5 * (max(LETTER * letters, self.legend_width) - views))
+        lengths = [width_of(text) for text in (self.heading, self.line) if text is not None]
+        aside = max(GAP, 0.5 * (max([self.legend_width, *lengths]) - views))
         width, height = aside + views + max(aside, beside), above + down + below
         self.set_size_inches(width, height)
         for (row, column), panel in np.ndenumerate(self.panels):
@@ -59,12 +60,19 @@ class Panels(Picture):
             left, length = aside + views + BAR_PLACE[0], BAR_LENGTH * down
             low = below + 0.5 * (down - length)
             self.bar.set_position((left / width, low / height, BAR_PLACE[1] / width, length / height))
+            label = self.bar.yaxis.label
+            label.set_fontsize(float(label.get_fontsize()) * down / max(width_of(label), down))
         middle = (aside + 0.5 * views) / width
         for legend in self.legends:
             legend.set_bbox_to_anchor((middle, (0.5 * GAP + line) / height))
         for text, inches in ((self.heading, height - 0.5 * HEADING), (self.line, 0.5 * (GAP + LINE))):
             if text is not None:
                 text.set(x=middle, y=inches / height, horizontalalignment="center", verticalalignment="center")
+
+
+def width_of(text: Text) -> float:
+    """Return an upper bound of the inches of a line of text."""
+    return LETTER * float(text.get_fontsize()) * len(text.get_text())
 
 
 def panels_of(rows: int, columns: int) -> tuple[Panels, Any]:

@@ -144,7 +144,10 @@ def draw_modes(path: str | Path | None, body: BodyLike, modes: Modes) -> Figure:
         limits = ColorRange(0.0, float(far.max()))
         patch = Patch(still + SWING * size / limits.high * moved, limits.colors(far), every=samples - 1)
         show(panel, f"{frequency:.4g} Hz", [patch], view)
-    return save(figure, path, "The lowest modes, coloured by their displacement")
+    which = (
+        f"The first {len(shown)} of {count} modes" if (count := len(modes.frequencies)) > MOST else "The lowest modes"
+    )
+    return save(figure, path, f"{which}, coloured by their displacement")
 
 
 def factor_in_words(factor: float) -> str:

@@ -23,7 +23,7 @@ from .cutaway import Painted, beyond, visible
 from .fields import SECTIONS, Samples
 from .outline import is_by_face
 from .palette import MAP
-from .panels import LETTER, PANEL, SWATCH, Panels
+from .panels import PANEL, SWATCH, Panels, width_of
 from .render import NAMELESS, Patch, View, draw, plain_patch, view_of, widest_view
 
 PACKED = 4  # of 9: 2 % larger files than by 6 in two thirds of the time
@@ -106,10 +106,7 @@ def name_colors(figure: Panels, body: BodyLike) -> None:
 
 def name_below(figure: Panels, swatches: Sequence[Swatch], columns: int) -> None:
     """Write a legend below the panels, in so many columns."""
-    longest = max(len(str(swatch.get_label())) for swatch in swatches)
-    figure.rows_of_legend = -(-len(swatches) // columns)
-    figure.legend_width = min(columns, len(swatches)) * (SWATCH + LETTER * longest)
-    figure.legend(
+    legend = figure.legend(
         handles=swatches,
         loc="lower center",
         ncols=columns,
@@ -119,6 +116,8 @@ def name_below(figure: Panels, swatches: Sequence[Swatch], columns: int) -> None
         handlelength=1.4,
         borderpad=0.0,
     )
+    figure.rows_of_legend = -(-len(swatches) // columns)
+    figure.legend_width = min(columns, len(swatches)) * (SWATCH + max(map(width_of, legend.get_texts())))
 
 
 EXTEND = {(False, False): "neither", (True, False): "min", (False, True): "max", (True, True): "both"}
@@ -148,11 +147,16 @@ def positive(values: NDArray[Any]) -> Array:
 
 
 def save(figure: Figure, path: str | Path | None, title: str = "") -> Figure:
-    """Write the figure as PNG or PDF, by the ending of the path, and return it; atomic. None: only return it."""
+    """Write the figure as PNG or PDF, by the ending of the path, and return it; atomic. None: only return it.
+
+    Raises ValueError where the path has no ending.
+    """
     if isinstance(figure, Panels):
         figure.heading = figure.suptitle(title, fontsize=14) if title else None
         figure.arrange()
     if path is not None:
+        if not Path(path).suffix:
+            raise ValueError(f"{path}: the name of a figure ends with .png or .pdf")
         with replacing(Path(path)) as temporary:
             if Path(path).suffix == ".png":
                 canvas = FigureCanvasAgg(figure)  # `savefig` draws it twice
