@@ -47,7 +47,7 @@ def draw_errors(
     limits = error_range([field.everywhere for field in fields])
     figure, rows = panels_of(len(solutions), 5)
     for row, field, solution in zip(rows, fields, solutions, strict=True):
-        for panel, title, shown in zip(row, ("boundary", *SECTIONS), (slice(6), *range(6, 9)), strict=False):
+        for panel, title, shown in zip(row[:-1], ("boundary", *SECTIONS), (slice(6), *range(6, 9)), strict=True):
             whole = isinstance(shown, slice)
             chosen = range(6) if isinstance(shown, slice) else (shown,)
             patches = [Patch(points[i], limits.colors(field.planes[i]), lit=False) for i in chosen]

@@ -46,11 +46,12 @@ def draw_conditions(path: str | Path | None, body: BodyLike, conditions: Sequenc
         return _draw(path, [Patch(points, palette[numbers]), edges], palette, names, "Where data are given", view=view)
     columns = min(COLUMNS, len(conditions))
     figure, axes = panels_of(-(-len(conditions) // columns), columns)
-    sides, size = best_sides(body, conditions), 13 * min(1.0, FITTING / max(len(_short(name)) for name in names))
-    for number, (panel, name, (view, is_seen)) in enumerate(zip(axes.flat, names, sides, strict=False)):
+    sides, labels = best_sides(body, conditions), list(map(_short, names))
+    size = 13 * min(1.0, FITTING / max(map(len, labels)))
+    for number, (panel, label, (view, is_seen)) in enumerate(zip(axes.flat, labels, sides, strict=False)):
         patches = [Patch(points, palette[numbers])] if is_seen else _through(points, numbers, number, palette)
         show(panel, "", [*patches, edges], view)
-        swatch = Swatch(color=palette[number], label=_short(name))
+        swatch = Swatch(color=palette[number], label=label)
         place = {"loc": "lower center", "bbox_to_anchor": (0.5, 1.0), "borderpad": 0.0, "borderaxespad": 0.2}
         panel.legend(handles=[swatch], frameon=False, fontsize=size, **place)
     return save(figure, path)

@@ -144,9 +144,8 @@ def draw_modes(path: str | Path | None, body: BodyLike, modes: Modes) -> Figure:
         limits = ColorRange(0.0, float(far.max()))
         patch = Patch(still + SWING * size / limits.high * moved, limits.colors(far), every=samples - 1)
         show(panel, f"{frequency:.4g} Hz", [patch], view)
-    which = (
-        f"The first {len(shown)} of {count} modes" if (count := len(modes.frequencies)) > MOST else "The lowest modes"
-    )
+    count = len(modes.frequencies)
+    which = f"The first {MOST} of {count} modes" if count > MOST else "The lowest modes"
     return save(figure, path, f"{which}, coloured by their displacement")
 
 

@@ -1,4 +1,4 @@
-"""Holds the parts that figures share: the blank figure of matplotlib, rendered views on it, colours, the file."""
+"""Holds what figures share: rendered views on their panels, legends and colour bars, the file."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -133,7 +133,7 @@ def color_bar(figure: Panels, limits: ColorRange, title: str, said: str = "") ->
     extend = EXTEND[below, limits.beyond is not None]
     if said:
         figure.line = figure.supxlabel(f"colours: {said}", fontsize=11)
-    figure.bar = figure.add_axes((0.9, 0.1, 0.1, 0.8))
+    figure.bar = figure.add_axes((0.9, 0.1, 0.1, 0.8))  # `arrange` gives it its place
     bar = figure.colorbar(ScalarMappable(limits.norm(), shades), cax=figure.bar, extend=extend)
     if limits.remark:
         bar.set_ticks([0.5], labels=[limits.remark], rotation="vertical", verticalalignment="center")
