@@ -4,6 +4,7 @@ A face has the number 2 * axis + side: `axis` is the parameter that is constant 
 the order of their numbers the faces are called u0, u1, v0, v1, w0, w1.
 """
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -48,11 +49,18 @@ def project_radially(centred: Array) -> Array:
     return np.asarray(centred / (2.0 * np.abs(centred).max(axis=1, keepdims=True)))
 
 
+@numba.njit(cache=True, nogil=True, error_model="numpy")  # type: ignore[untyped-decorator]
 def snap(parameters: Array) -> Array:
     """Return parameters (n, 3) projected radially onto the cube, and onto edges and corners within NEAR_EDGE."""
-    projected = project_radially(parameters - 0.5)
-    at_side = np.abs(projected) >= 0.5 - NEAR_EDGE
-    return np.where(at_side, 0.5 + 0.5 * np.sign(projected), 0.5 + projected)
+    found = np.empty_like(parameters)
+    for n in range(len(parameters)):
+        x, y, z = parameters[n, 0] - 0.5, parameters[n, 1] - 0.5, parameters[n, 2] - 0.5
+        width = 2.0 * max(abs(x), abs(y), abs(z))
+        for c, centred in enumerate((x, y, z)):
+            projected = centred / width
+            is_at_side = abs(projected) >= 0.5 - NEAR_EDGE
+            found[n, c] = 0.5 + (math.copysign(0.5, projected) if is_at_side else projected)
+    return found
 
 
 def damped_fit(first: Array, second: Array, right: Array, damping: float) -> tuple[Array, Array]:

@@ -1,8 +1,11 @@
 """Finds, prevents and turns back flipped triangles of a surface laid out on the cube."""
 
+import math
+
 import numba
 import numpy as np
 
+from ..array_copies import write
 from ..arrays import Array, IntArray, Mask
 from .cube import snap
 
@@ -34,20 +37,36 @@ def orientation(places: Array, faces: IntArray) -> tuple[Array, Array]:
     return triple, noise
 
 
+@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def flipped(places: Array, faces: IntArray) -> Mask:
     """Return the mask (m,) of triangles (m, 3) that do not face outwards, with a margin for later rounding errors."""
-    return np.asarray(orientation(places, faces)[0] <= _FLAT)
+    found = np.empty(len(faces), np.bool_)
+    for t in range(len(faces)):
+        p0, p1, p2 = places[faces[t, 0]], places[faces[t, 1]], places[faces[t, 2]]
+        triple = 0.0
+        for c in range(3):
+            d, e = (c + 1) % 3, (c + 2) % 3
+            triple += (p0[c] - 0.5) * ((p1[d] - p0[d]) * (p2[e] - p0[e]) - (p1[e] - p0[e]) * (p2[d] - p0[d]))
+        found[t] = triple <= _FLAT
+    return found
 
 
+@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def new_flips(before: Array, after: Array, faces: IntArray) -> Mask:
     """Return the mask (n,) of points that must stay, so that no other triangle flips when the rest moves to `after`."""
-    stay, allowed = np.zeros(len(before), dtype=bool), flipped(before, faces)
+    stay, allowed, places = np.zeros(len(before), np.bool_), flipped(before, faces), after.copy()
     for _ in range(_HOLDING_ROUNDS):
-        bad = flipped(np.where(stay[:, None], before, after), faces) & ~allowed
-        if not bad.any():
+        bad, is_done = flipped(places, faces), True
+        for t in range(len(faces)):
+            if bad[t] and not allowed[t]:
+                is_done = False
+                for corner in faces[t]:
+                    stay[corner] = True
+                    write(before[corner], places[corner])
+        if is_done:
             return stay
-        stay[faces[bad].ravel()] = True
-    return np.ones(len(before), dtype=bool)
+    stay[:] = True
+    return stay
 
 
 def unflip(parameters: Array, faces: IntArray, still: Mask | None = None) -> Array:
@@ -89,23 +108,48 @@ def untangle(parameters: Array, faces: IntArray, sweeps: int = _SWEEPS, still: M
     are flipped at the time move; where triangles stay flipped, one more ring of neighbours joins after every _PATIENCE
     sweeps. After all `sweeps` some flips may be left. still: (n,), points that must not move.
     """
-    i, j = faces.ravel(), faces[:, [1, 2, 0]].ravel()  # closed surface: both directions appear
-    direction = _directions(parameters)
+    held = np.zeros(len(parameters), dtype=bool) if still is None else still
+    return snap(0.5 + _relaxed(_directions(parameters), np.ascontiguousarray(faces), sweeps, held))
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")  # type: ignore[untyped-decorator]
+def _relaxed(direction: Array, faces: IntArray, sweeps: int, still: Mask) -> Array:
+    """Return the unit vectors (n, 3) of `untangle` after its sweeps; the given ones are overwritten."""
     for sweep in range(sweeps):
         bad = flipped(0.5 + direction, faces)
-        if not bad.any():
+        free = np.zeros(len(direction), np.bool_)
+        for t in range(len(faces)):
+            for corner in faces[t]:
+                free[corner] |= bad[t]
+        if not free.any():
             break
-        free = np.zeros(len(parameters), dtype=bool)
-        free[faces[bad].ravel()] = True
         for _ in range(sweep // _PATIENCE):
-            free[i[free[j]]] = True
-        if still is not None:
-            free &= ~still
-        used = free[i]
-        total = np.stack([np.bincount(i[used], direction[j[used], c], len(free)) for c in range(3)], axis=1)[free]
-        moved = direction[free] + total / np.linalg.norm(total, axis=1, keepdims=True)
-        direction[free] = moved / np.linalg.norm(moved, axis=1, keepdims=True)
-    return snap(0.5 + direction)
+            inner = free.copy()
+            for t in range(len(faces)):
+                for k in range(3):  # closed surface: both directions of an edge appear
+                    free[faces[t, k]] |= inner[faces[t, (k + 1) % 3]]
+        total = np.zeros_like(direction)
+        for t in range(len(faces)):
+            for k in range(3):
+                point, other = faces[t, k], faces[t, (k + 1) % 3]
+                if free[point]:
+                    for c in range(3):
+                        total[point, c] += direction[other, c]
+        for point in range(len(direction)):
+            if free[point] and not still[point]:
+                _turn(direction[point], total[point])
+    return direction
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")  # type: ignore[untyped-decorator]
+def _turn(direction: Array, towards: Array) -> None:
+    """Turn a unit vector half way to another vector, in place."""
+    length = math.sqrt(towards[0] ** 2 + towards[1] ** 2 + towards[2] ** 2)
+    for c in range(3):
+        direction[c] += towards[c] / length
+    length = math.sqrt(direction[0] ** 2 + direction[1] ** 2 + direction[2] ** 2)
+    for c in range(3):
+        direction[c] /= length
 
 
 def untangle_whole(parameters: Array, faces: IntArray, sweeps: int = _SWEEPS, still: Mask | None = None) -> Array:

@@ -102,8 +102,8 @@ def contact_penalty(spline: SplineMap, gap: float = _GAP, near: IntArray | None 
         for chosen in (touching, facing)
     )
     return ContactPenalty(
-        first.rows,
-        second.rows,
+        first.window.rows(0, 0),
+        second.window.rows(0, 0),
         normals[facing],
         1.0 / len(boundary.points),
         gap,

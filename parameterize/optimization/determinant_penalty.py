@@ -12,14 +12,14 @@ from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
 
-import numba
 import numpy as np
 
-from ..arrays import Array, Floats, IntArray, Knots, Mask
-from ..spline.bernstein import add_products, binomials, cross_products, extraction
+from ..arrays import Array, Floats, IntArray, Knots
+from ..spline.bernstein import binomials, extraction
 from ..spline.bspline import breakpoints
 from ..spline.spline_map import ControlNets
 from ..threads import in_parallel
+from .determinant_rows import add_windows, combined, diagonal_blocks, short_rows, squared
 from .operators import PiecewiseOperator, no_blocks
 from .spans import numbers, with_neighbours
 from .term import Blockwise, RoundWeights
@@ -48,8 +48,8 @@ class _PenaltySpans:
     weights: Array
     back: Array
 
-    def some(self, chosen: Mask) -> "_PenaltySpans":
-        """Return the spans that the mask `chosen` (k,) selects."""
+    def some(self, chosen: IntArray) -> "_PenaltySpans":
+        """Return the spans with the numbers `chosen` (m,)."""
         return _PenaltySpans(*(getattr(self, field.name)[chosen] for field in fields(self)))
 
 
@@ -85,7 +85,7 @@ class _Rows:
 
     def squared(self, x: Floats) -> _Windows:
         """Return the windows of `in_control_points`: the transposed rows times their shares, times the rows of x."""
-        return self.spans.first, _squared(x, self.spans.first, self.rows, self.starts, 2.0 * self.shares)
+        return self.spans.first, squared(x, self.spans.first, self.rows, self.starts, 2.0 * self.shares)
 
 
 class BlockDeterminants:
@@ -100,9 +100,9 @@ class BlockDeterminants:
         self._extractions = [extraction(k, degree) for k in knots]
         self._widths = [np.diff(breakpoints(k)) for k in knots]
         whole, lowered = binomials(degree), degree * binomials(degree - 1)
-        self._scales = [  # from differences of Bezier points to derivatives in scaled Bernstein form
+        self._scales = tuple(  # from differences of Bezier points to derivatives in scaled Bernstein form
             np.einsum("i,j,k->ijk", *(lowered if d == axis else whole for d in range(3))) for axis in range(3)
-        ]
+        )
         self._unscale = np.einsum("i,j,k->ijk", *(1.0 / binomials(3 * degree - 1),) * 3)
         self._share = 1.0 / (self._unscale.size * count)
         self._pieces: list[_PenaltySpans] = []
@@ -131,7 +131,7 @@ class BlockDeterminants:
         def part(spans: _PenaltySpans) -> tuple[_Rows, float, _Windows]:
             found = self._short_rows(control, spans)
             pull = found.shares * found.shortfall
-            pushed = _combine(found.rows, found.starts, -2.0 * pull, found.spans.back)
+            pushed = combined(found.rows, found.starts, -2.0 * pull, found.spans.back)
             return found, float(pull @ found.shortfall), (found.spans.first, pushed)
 
         rows, energies, pushed = zip(*in_parallel(part, self._pieces), strict=True) if self._pieces else ((), (), ())
@@ -158,7 +158,7 @@ class BlockDeterminants:
             found = rows_of(number)
             if not len(found.rows):
                 return None
-            own = found.spans.first, _blocks(found.rows, found.starts, 2.0 * found.shares)
+            own = found.spans.first, diagonal_blocks(found.rows, found.starts, 2.0 * found.shares)
             taken += found.rows.nbytes
             if taken <= _MOST_KEPT:
                 return found.squared, own
@@ -172,25 +172,10 @@ class BlockDeterminants:
 
     def _short_rows(self, control: Array, spans: _PenaltySpans) -> _Rows:
         """Return the rows of the coefficients that lie below the floor on some spans."""
-        points = _bezier_points(control, spans.first, spans.weights)
-        points = points.reshape(len(points), 3, *spans.weights.shape[2:], spans.weights.shape[2])
-        bezier = np.ascontiguousarray(np.moveaxis(points, 0, -1))  # (3, p + 1, p + 1, p + 1, k)
-        nets = [np.diff(bezier, axis=1 + d) * scale[..., None] for d, scale in enumerate(self._scales)]
-        cross = cross_products(nets[1], nets[2])
-        determinant = np.zeros((*self._unscale.shape, len(spans.first)))
-        for component in range(3):
-            add_products(nets[0][component], cross[component], 1.0, determinant)
-        chosen = _has_short(determinant, self._unscale, spans.volumes, spans.floors)
-        spans, nets = spans.some(chosen), [net[..., chosen] for net in nets]  # few: the rest is made for these alone
-        unscaled = self._unscale / spans.volumes[:, None, None, None]
-        short = spans.floors[:, None, None, None] - np.moveaxis(determinant[..., chosen], -1, 0) * unscaled
-        place = np.ascontiguousarray(np.argwhere(short > 0.0))  # (r, 4): span and coefficient, span by span
-        rows = np.zeros((len(place), 3, *bezier.shape[1:4]))
-        crosses = cross[..., chosen], cross_products(nets[2], nets[0]), cross_products(nets[0], nets[1])
-        for direction, (other, scale) in enumerate(zip(crosses, self._scales, strict=True)):
-            _add_derivatives(place, other, scale, unscaled, direction, rows)
-        starts = np.concatenate([[0], np.cumsum(np.bincount(place[:, 0], minlength=len(short)))])
-        return _Rows(spans, short[tuple(place.T)], spans.shares[place[:, 0]], rows, starts)
+        of_spans = spans.first, spans.weights, spans.volumes, spans.floors
+        chosen, shortfall, rows, starts = short_rows(control, *of_spans, self._scales, self._unscale)
+        spans = spans.some(chosen)
+        return _Rows(spans, shortfall, spans.shares.repeat(np.diff(starts)), rows, starts)
 
 
 class DeterminantPenalty(Blockwise[BlockDeterminants]):
@@ -238,150 +223,5 @@ def _collected(parts: list[_Windows], like: Floats) -> Floats:
     """Add windows (k, ..., p + 1, p + 1, p + 1) of control points in order; each starts at its first point (k, 3)."""
     total = np.zeros_like(like)
     for first, windows in parts:
-        _add_windows(windows, first, total)
+        add_windows(windows, first, total)
     return total
-
-
-@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def _along_axes(field: Array, u: Array, v: Array, w: Array) -> None:
-    """Apply matrices (n, n) along the axes of a field (n^3,), in place: each product makes the first axis the last."""
-    n = len(u)
-    for matrix in (u, v, w):
-        applied = np.zeros((n, n * n), field.dtype)
-        for i in range(n):
-            for x in range(n):
-                for r in range(n * n):
-                    applied[i, r] += matrix[i, x] * field[x * n * n + r]
-        for r in range(n * n):
-            for i in range(n):
-                field[r * n + i] = applied[i, r]
-
-
-@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def _bezier_points(control: Array, first: IntArray, weights: Array) -> Array:
-    """Return the Bezier points (k, 3, n^3) of spans with first control points (k, 3) and weights (k, 3, n, n)."""
-    spans, n = len(first), weights.shape[2]
-    points = np.empty((spans, 3, n**3), control.dtype)
-    for s in range(spans):
-        u, v, w = first[s]
-        for c in range(3):
-            field = points[s, c]
-            for i in range(n):
-                for j in range(n):
-                    for k in range(n):
-                        field[(i * n + j) * n + k] = control[c, u + i, v + j, w + k]
-            _along_axes(field, weights[s, 0], weights[s, 1], weights[s, 2])
-    return points
-
-
-@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def _has_short(determinant: Array, unscale: Array, volumes: Array, floors: Array) -> Mask:
-    """Return which spans (k,) have a coefficient below their floor, of coefficients (q, q, q, k) in scaled form."""
-    coefficients, factors = determinant.reshape(-1, len(floors)), unscale.ravel()
-    least = np.full(len(floors), np.inf)
-    for i in range(len(factors)):
-        for s in range(len(floors)):
-            least[s] = min(least[s], coefficients[i, s] * (factors[i] / volumes[s]))
-    return least < floors
-
-
-@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def _add_derivatives(place: IntArray, cross: Array, scale: Array, shares: Array, direction: int, rows: Array) -> None:
-    """Add to rows (r, 3, n, n, n) the derivatives of coefficients (r, 4) in the Bezier points, by one derivative of F.
-
-    cross: (3, ..., k), the product of the two other derivatives of F. scale: the factor from differences of Bezier
-    points to the control net of that derivative.
-    """
-    step = np.zeros(3, np.int64)
-    step[direction] = 1
-    for r in range(len(place)):
-        s, a, b, c = place[r]
-        share = shares[s, a, b, c]
-        for i in range(max(0, a - cross.shape[1] + 1), min(scale.shape[0], a + 1)):
-            for j in range(max(0, b - cross.shape[2] + 1), min(scale.shape[1], b + 1)):
-                for k in range(max(0, c - cross.shape[3] + 1), min(scale.shape[2], c + 1)):
-                    factor = share * scale[i, j, k]
-                    for component in range(3):
-                        change = factor * cross[component, a - i, b - j, c - k, s]
-                        rows[r, component, i, j, k] -= change
-                        rows[r, component, i + step[0], j + step[1], k + step[2]] += change
-
-
-@numba.njit(cache=True, nogil=True, fastmath={"contract", "reassoc"})  # type: ignore[untyped-decorator]
-def _changes(rows: Array, starts: IntArray, points: Array) -> Array:
-    """Return the products of the rows of each span with its Bezier points (k, 3, n, n, n)."""
-    flat, place = rows.reshape(len(rows), -1), points.reshape(len(points), -1)
-    changes = np.empty(len(rows), rows.dtype)
-    for s in range(len(points)):
-        for r in range(starts[s], starts[s + 1]):
-            change = rows.dtype.type(0.0)
-            for i in range(flat.shape[1]):
-                change += flat[r, i] * place[s, i]
-            changes[r] = change
-    return changes
-
-
-@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def _combine(rows: Array, starts: IntArray, factors: Array, back: Array) -> Array:
-    """Return the sum of each span's rows times their factors (r,), as windows (k, 3, n, n, n) of control points."""
-    spans, n = len(starts) - 1, back.shape[2]
-    flat, windows = rows.reshape(len(rows), 3, n**3), np.zeros((spans, 3, n**3), rows.dtype)
-    for s in range(spans):
-        for r in range(starts[s], starts[s + 1]):
-            for c in range(3):
-                for i in range(n**3):
-                    windows[s, c, i] += factors[r] * flat[r, c, i]
-        for c in range(3):
-            _along_axes(windows[s, c], back[s, 0], back[s, 1], back[s, 2])
-    return windows.reshape(spans, 3, n, n, n)
-
-
-@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def _squared(control: Array, first: IntArray, rows: Array, starts: IntArray, shares: Array) -> Array:
-    """Return control points times each span's rows, their shares (r,) and the transposed rows, as windows.
-
-    rows: the derivatives in control points.
-    """
-    spans, n = len(first), rows.shape[2]
-    points = np.empty((spans, 3, n, n, n), rows.dtype)
-    for s in range(spans):
-        u, v, w = first[s]
-        for c in range(3):
-            for i in range(n):
-                for j in range(n):
-                    for k in range(n):
-                        points[s, c, i, j, k] = control[c, u + i, v + j, w + k]
-    factors = shares * _changes(rows, starts, points)
-    flat, windows = rows.reshape(len(rows), 3 * n**3), np.zeros((spans, 3 * n**3), rows.dtype)
-    for s in range(spans):
-        for r in range(starts[s], starts[s + 1]):
-            for i in range(3 * n**3):
-                windows[s, i] += factors[r] * flat[r, i]
-    return windows.reshape(spans, 3, n, n, n)
-
-
-@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def _blocks(rows: Array, starts: IntArray, shares: Array) -> Array:
-    """Return the blocks on the diagonal of `_squared`, as windows (k, 6, n, n, n)."""
-    n = rows.shape[2]
-    flat, windows = rows.reshape(len(rows), 3, n**3), np.zeros((len(starts) - 1, 6, n**3), rows.dtype)
-    for s in range(len(windows)):
-        for r in range(starts[s], starts[s + 1]):
-            for c in range(3):
-                for other in range(c + 1):
-                    entry = c * (c + 1) // 2 + other
-                    for i in range(n**3):
-                        windows[s, entry, i] += shares[r] * flat[r, c, i] * flat[r, other, i]
-    return windows.reshape(len(windows), 6, n, n, n)
-
-
-@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def _add_windows(windows: Array, first: IntArray, total: Array) -> None:
-    """Add windows (k, m, n, n, n) to control points (m, n_u, n_v, n_w); each starts at its first control point."""
-    n = windows.shape[2]
-    for s in range(len(first)):
-        for c in range(windows.shape[1]):
-            for i in range(n):
-                for j in range(n):
-                    for k in range(n):
-                        total[c, first[s, 0] + i, first[s, 1] + j, first[s, 2] + k] += windows[s, c, i, j, k]

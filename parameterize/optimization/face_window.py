@@ -4,12 +4,13 @@ from dataclasses import dataclass
 
 import numba
 import numpy as np
+from numpy.typing import DTypeLike
 
-from ..arrays import Array, IntArray, Mask
+from ..arrays import Array, Floats, IntArray, Mask
 from ..spline.bspline import basis_derivatives, breakpoints
 from ..spline.spline_map import ControlNets
 from ..threads import in_parallel
-from .operators import pieces
+from .operators import ControlRows, pieces
 
 Polynomials = tuple[IntArray, Array, IntArray, Array, IntArray]
 
@@ -33,50 +34,72 @@ def polynomials_of(nets: ControlNets) -> Polynomials:
 
 @dataclass(frozen=True, eq=False)
 class FaceWindow:
-    """Hold the numbers (N, k) of control points, and the values and derivatives in_a, in_b (N, 2, p + 1) of functions.
+    """Hold the control points that act on N points, and the values and derivatives of the basis functions there.
 
-    in_a and in_b belong to the two directions of the point's face.
+    places: (N, 3), the number of the first control point, and the steps of the numbers along the two directions of the
+    point's face. in_a, in_b: (N, 2, p + 1), of the functions in these directions.
     """
 
-    indices: IntArray
+    places: IntArray
     in_a: Array
     in_b: Array
 
     @classmethod
+    def empty(cls, count: int, degree: int) -> "FaceWindow":
+        """Return a window whose arrays are still to be filled."""
+        values = count, 2, degree + 1
+        return cls(np.empty((count, 3), np.int64), np.empty(values), np.empty(values))
+
+    @classmethod
     def at(cls, polynomials: Polynomials, parameters: Array, cube_faces: IntArray) -> "FaceWindow":
         """Return the window of the basis functions at points (N, 3) on faces (N,)."""
-        found = in_parallel(
-            lambda rows: _face_windows(polynomials, parameters[rows], cube_faces[rows]), pieces(len(cube_faces))
-        )
-        return cls(*(np.concatenate(parts) for parts in zip(*found, strict=True)))
+        window = cls.empty(len(cube_faces), polynomials[3].shape[1] - 1)
 
-    def weights(self, a: int, b: int) -> Array:
-        """Return the weights (N, k) of the control points in the derivative of orders a and b."""
-        return (self.in_a[:, a, :, None] * self.in_b[:, b, None, :]).reshape(self.indices.shape)
+        def part(rows: slice) -> None:
+            _fill_windows(polynomials, parameters[rows], cube_faces[rows], *window.some(rows).arrays)
+
+        in_parallel(part, pieces(len(cube_faces)))
+        return window
+
+    @property
+    def arrays(self) -> tuple[IntArray, Array, Array]:
+        """Return the three arrays."""
+        return self.places, self.in_a, self.in_b
+
+    def some(self, rows: slice | IntArray) -> "FaceWindow":
+        """Return the window of some of the points."""
+        return FaceWindow(self.places[rows], self.in_a[rows], self.in_b[rows])
+
+    def rows(self, a: int, b: int, dtype: DTypeLike = np.float64) -> ControlRows:
+        """Return the rows that yield the derivatives of F of orders a and b."""
+        shape = len(self.places), self.in_a.shape[2] ** 2
+        columns, values = np.empty(shape, np.int64), np.empty(shape, dtype)
+        in_parallel(
+            lambda rows: _fill_rows(*self.some(rows).arrays, a, b, columns[rows], values[rows]), pieces(shape[0])
+        )
+        return ControlRows(columns, values)
 
     def derivatives(self, control: Array) -> tuple[Array, Array, Array]:
         """Return F and its tangents t_a and t_b at the points, (N, 3) each."""
-        flat, windows = np.ascontiguousarray(control.reshape(3, -1)), (self.indices, self.in_a, self.in_b)
-        found = in_parallel(lambda piece: _tangents(*(w[piece] for w in windows), flat), pieces(len(self.indices)))
-        value, along_a, along_b = np.concatenate(found).swapaxes(0, 1)
+        flat, found = np.ascontiguousarray(control.reshape(3, -1)), np.empty((len(self.places), 3, 3))
+        in_parallel(lambda rows: _fill_all(*self.some(rows).arrays, flat, found[rows]), pieces(len(found)))
+        value, along_a, along_b = found.swapaxes(0, 1)
         return value, along_a, along_b
 
     def with_points(self, chosen: Mask, other: "FaceWindow") -> "FaceWindow":
         """Return this window with the rows of the chosen points (N,) replaced by the rows of another window."""
-        replaced = FaceWindow(self.indices.copy(), self.in_a.copy(), self.in_b.copy())
-        replaced.indices[chosen], replaced.in_a[chosen], replaced.in_b[chosen] = other.indices, other.in_a, other.in_b
+        replaced = FaceWindow(self.places.copy(), self.in_a.copy(), self.in_b.copy())
+        replaced.places[chosen], replaced.in_a[chosen], replaced.in_b[chosen] = other.arrays
         return replaced
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def _face_windows(polynomials: Polynomials, parameters: Array, cube_faces: IntArray) -> tuple[IntArray, Array, Array]:
-    """Return the three arrays of a FaceWindow for points (N, 3) on faces (N,)."""
-    count, width = len(parameters), polynomials[3].shape[1]
-    indices = np.empty((count, width * width), np.int64)
-    in_a, in_b = np.empty((count, 2, width)), np.empty((count, 2, width))
-    for n in range(count):
-        fill_window(polynomials, parameters, cube_faces, n, indices, in_a, in_b)
-    return indices, in_a, in_b
+def _fill_windows(
+    polynomials: Polynomials, parameters: Array, cube_faces: IntArray, places: IntArray, in_a: Array, in_b: Array
+) -> None:
+    """Write the three arrays of a FaceWindow for points (N, 3) on faces (N,)."""
+    for n in range(len(parameters)):
+        fill_window(polynomials, parameters, cube_faces, n, places, in_a, in_b)
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
@@ -85,7 +108,7 @@ def fill_window(
     parameters: Array,
     cube_faces: IntArray,
     n: int,
-    indices: IntArray,
+    places: IntArray,
     in_a: Array,
     in_b: Array,
 ) -> None:
@@ -99,17 +122,21 @@ def fill_window(
     first_b = _fill_values(polynomials, own + b, parameters[n, b], n, in_b)
     last = (first[starts[own + axis + 1] - 1] + width - 1) * strides[axis]
     base = offsets[block] + (last if cube_faces[n] % 2 else 0)
-    for i in range(width):
-        for j in range(width):
-            indices[n, i * width + j] = base + (first_a + i) * strides[a] + (first_b + j) * strides[b]
+    places[n, 0] = base + first_a * strides[a] + first_b * strides[b]
+    places[n, 1], places[n, 2] = strides[a], strides[b]
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def _fill_values(polynomials: Polynomials, direction: int, x: float, n: int, out: Array) -> int:
     """Write row n of values and derivatives (N, 2, p + 1); return the number of the first function that is not zero."""
     starts, begins, first, coefficients, _ = polynomials
-    own = begins[starts[direction] : starts[direction + 1]]
-    low = starts[direction] + max(np.searchsorted(own, x, side="right") - 1, 0)
+    low, high = starts[direction], starts[direction + 1]
+    while high - low > 1:  # the last span that begins at x or before
+        middle = (low + high) // 2
+        if begins[middle] <= x:
+            low = middle
+        else:
+            high = middle
     step, width = x - begins[low], out.shape[2]
     for i in range(width):
         value, slope = coefficients[low, width - 1, i], 0.0
@@ -121,26 +148,46 @@ def _fill_values(polynomials: Polynomials, direction: int, x: float, n: int, out
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def _tangents(indices: IntArray, in_a: Array, in_b: Array, control: Array) -> Array:
-    """Return F, t_a and t_b, (N, 3, 3), of control points (3, n) at the points of a FaceWindow."""
-    out = np.empty((len(indices), 3, 3))
-    for n in range(len(indices)):
-        fill_tangents(indices, in_a, in_b, control, n, out)
-    return out
+def _fill_rows(places: IntArray, in_a: Array, in_b: Array, a: int, b: int, columns: IntArray, values: Floats) -> None:
+    """Write columns and values (N, k) of the rows of `FaceWindow.rows`."""
+    width = in_a.shape[2]
+    for n in range(len(places)):
+        for i in range(width):
+            for j in range(width):
+                columns[n, i * width + j] = places[n, 0] + i * places[n, 1] + j * places[n, 2]
+                values[n, i * width + j] = in_a[n, a, i] * in_b[n, b, j]
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def fill_tangents(indices: IntArray, in_a: Array, in_b: Array, control: Array, n: int, out: Array) -> None:
-    """Write row n of F, t_a and t_b (N, 3, 3)."""
+def _fill_all(places: IntArray, in_a: Array, in_b: Array, control: Array, found: Array) -> None:
+    """Write F, t_a and t_b (N, 3, 3) at the points of a FaceWindow; control points: (3, n)."""
+    for n in range(len(places)):
+        fill_tangents(places, in_a, in_b, control, n, found, n)
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def fill_tangents(places: IntArray, in_a: Array, in_b: Array, control: Array, n: int, found: Array, row: int) -> None:
+    """Write F, t_a and t_b at the n-th point into a row of `found` (m, 3, 3)."""
     width = in_a.shape[2]
-    out[n] = 0.0
-    for i in range(width):
-        for j in range(width):
-            column = indices[n, i * width + j]
-            plain = in_a[n, 0, i] * in_b[n, 0, j]
-            along_a, along_b = in_a[n, 1, i] * in_b[n, 0, j], in_a[n, 0, i] * in_b[n, 1, j]
-            for c in range(3):
-                point = control[c, column]
-                out[n, 0, c] += plain * point
-                out[n, 1, c] += along_a * point
-                out[n, 2, c] += along_b * point
+    for c in range(3):
+        value, along_a, along_b = 0.0, 0.0, 0.0
+        for i in range(width):
+            plain, steep = 0.0, 0.0  # along b
+            column = places[n, 0] + i * places[n, 1]
+            for j in range(width):
+                plain += in_b[n, 0, j] * control[c, column]
+                steep += in_b[n, 1, j] * control[c, column]
+                column += places[n, 2]
+            value += in_a[n, 0, i] * plain
+            along_a += in_a[n, 1, i] * plain
+            along_b += in_a[n, 0, i] * steep
+        found[row, 0, c], found[row, 1, c], found[row, 2, c] = value, along_a, along_b
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def agreement(found: Array, row: int, normals: Array, n: int, face: int) -> float:
+    """Return (t_a x t_b) . n with the tangents of F in a row of `found`, and the outward normal of the n-th point."""
+    size = (found[row, 1, 1] * found[row, 2, 2] - found[row, 1, 2] * found[row, 2, 1]) * normals[n, 0]
+    size += (found[row, 1, 2] * found[row, 2, 0] - found[row, 1, 0] * found[row, 2, 2]) * normals[n, 1]
+    size += (found[row, 1, 0] * found[row, 2, 1] - found[row, 1, 1] * found[row, 2, 0]) * normals[n, 2]
+    return size if face % 2 == 1 else -size

@@ -9,12 +9,15 @@ hard surface 7 times.
 
 from dataclasses import dataclass
 
+import numba
 import numpy as np
 
-from ..arrays import Array, Floats
-from ..cube.cube import axis_and_side
+from ..arrays import Array, Floats, IntArray
+from ..cube.cube import axis_and_side, tangent_axes
 from ..quality.rotations import dots
-from .operators import ControlRows, PiecewiseOperator, no_blocks
+from ..threads import in_parallel
+from .face_window import agreement, fill_tangents
+from .operators import ControlRows, PiecewiseOperator, no_blocks, pieces
 from .surface_distance import Correspondence
 from .term import RoundWeights
 
@@ -85,18 +88,39 @@ def alignment_penalty(fit: Correspondence, control: Array, floor: float = _FLOOR
 
     The penalty includes points that could fall below the floor in the next step.
     """
-    window = fit.sliding.window
-    _, tangent_a, tangent_b = window.derivatives(control)
-    _, side = axis_and_side(fit.sliding.cube_faces)
-    outward = side == 1
-    normals = np.where(outward, 1.0, -1.0)[:, None] * fit.normals
-    lengths = fit.sliding.lengths
-    size = np.einsum("nc,nc->n", np.cross(tangent_a, tangent_b), normals) / (lengths[0] * lengths[1])
-    low = size < _MARGIN * floor
-    along_a, along_b = window.weights(1, 0) / lengths[0][:, None], window.weights(0, 1) / lengths[1][:, None]
+    sliding = fit.sliding
+    window, field, sizes = sliding.window, np.ascontiguousarray(control.reshape(3, -1)), np.empty(len(fit.points))
+
+    def part(rows: slice) -> None:
+        here = sliding.cube_faces[rows], sliding.boxes
+        _write_agreements(window.some(rows).arrays, field, fit.normals[rows], *here, sizes[rows])
+
+    in_parallel(part, pieces(len(sizes)))
+    low = np.flatnonzero(sizes < _MARGIN * floor)
+    near, faces = window.some(low), sliding.cube_faces[low]
+    axis, side = axis_and_side(faces)
+    a, b = tangent_axes(axis)
+    areas = sliding.boxes[faces // 6, a] * sliding.boxes[faces // 6, b]
+    normals = np.where(side == 1, 1.0, -1.0)[:, None] * fit.normals[low] / areas[:, None]
     return AlignmentPenalty(
-        (ControlRows(window.indices[low], along_a[low]), ControlRows(window.indices[low], along_b[low])),
-        np.ascontiguousarray(normals[low].T),
-        fit.weights[low],
-        floor,
+        (near.rows(1, 0), near.rows(0, 1)), np.ascontiguousarray(normals.T), fit.weights[low], floor
     )
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _write_agreements(
+    window: tuple[IntArray, Array, Array],
+    control: Array,
+    normals: Array,
+    cube_faces: IntArray,
+    boxes: Array,
+    sizes: Array,
+) -> None:
+    """Write (t_a x t_b) . n (N,) at the points of a FaceWindow, over the area of the point's face; boxes: sides."""
+    places, in_a, in_b = window
+    found = np.empty((1, 3, 3))
+    for n in range(len(sizes)):
+        block, axis = cube_faces[n] // 6, cube_faces[n] % 6 // 2
+        area = boxes[block, (axis + 1) % 3] * boxes[block, (axis + 2) % 3]
+        fill_tangents(places, in_a, in_b, control, n, found, 0)
+        sizes[n] = agreement(found, 0, normals, n, cube_faces[n]) / area

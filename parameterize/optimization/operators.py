@@ -106,14 +106,22 @@ class ControlRows:
 
         metric: the matrices M (N, 3, 3), of which the symmetric parts count.
         """
-        out = no_blocks(like)
-        _add_blocks(self.columns, self.values * (other or self).values, metric, out.reshape(6, -1))
-        return out
+        others = (other or self).values
+
+        def part(rows: slice) -> Floats:
+            out = no_blocks(like)
+            _add_blocks(self.columns[rows], self.values[rows], others[rows], metric[rows], out.reshape(6, -1))
+            return out
+
+        return _summed(in_parallel(part, pieces(len(others))), no_blocks(like))
 
 
 def _summed(parts: list[Floats], like: Floats) -> Floats:
-    """Return the sum of parts (3, n), added in their order, in the shape of the control points `like`."""
-    return sum(parts[1:], start=parts[0]).reshape(like.shape)
+    """Return the sum of parts, added in their order to the first one, in the shape of `like`."""
+    total = parts[0]
+    for part in parts[1:]:
+        total += part
+    return total.reshape(like.shape)
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
@@ -141,8 +149,8 @@ def _spread(columns: IntArray, values: Floats, dual: Floats, count: int) -> Floa
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def _add_blocks(columns: IntArray, factors: Floats, metric: Floats, out: Floats) -> None:
-    """Add metrics (m, 3, 3) times their factors (m, k) to the blocks (6, n) of the columns (m, k)."""
+def _add_blocks(columns: IntArray, values: Floats, others: Floats, metric: Floats, out: Floats) -> None:
+    """Add metrics (m, 3, 3) times the products of two values (m, k) to the blocks (6, n) of the columns (m, k)."""
     half = out.dtype.type(0.5)
     for row in range(len(columns)):
         m = metric[row]
@@ -155,8 +163,9 @@ def _add_blocks(columns: IntArray, factors: Floats, metric: Floats, out: Floats)
             m[2, 2],
         )
         for place in range(columns.shape[1]):
+            factor, column = values[row, place] * others[row, place], columns[row, place]
             for e in range(6):
-                out[e, columns[row, place]] += factors[row, place] * entries[e]
+                out[e, column] += factor * entries[e]
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]

@@ -11,16 +11,15 @@ from functools import cached_property
 import numba
 import numpy as np
 
-from ..array_copies import write
 from ..arrays import Array, IntArray, Knots, Mask
-from ..cube.cube import axis_and_side, damped_solution, nearest_faces, tangent_axes
+from ..cube.cube import damped_solution, nearest_faces
 from ..cube.flips import new_flips, unflip, untangle, untangle_whole
 from ..spline.bspline import breakpoints
 from ..spline.spline_map import ControlNets
 from ..threads import in_parallel
 from .adjacent_faces import Edges, next_faces
-from .face_window import FaceWindow, Polynomials, fill_tangents, fill_window, polynomials_of
-from .operators import ControlRows, pieces
+from .face_window import FaceWindow, Polynomials, agreement, fill_tangents, fill_window, polynomials_of
+from .operators import pieces
 from .spans import numbers, with_neighbours
 
 _DAMPING = 1e-6  # against parallel tangents
@@ -29,7 +28,7 @@ _NO_TRIANGLES = np.zeros((0, 3), dtype=np.int64)
 
 
 class SlidingParameters:
-    """Hold parameters (N, 3) on faces (N,) of a block, and the rows that yield F there.
+    """Hold parameters (N, 3) on faces (N,) of a block, and the basis functions there.
 
     The points to which parameters slide are not part of this class, because the samples of contact.py have none.
     Correspondence, a term of the energy, adds the points, their metrics and their weights.
@@ -64,17 +63,10 @@ class SlidingParameters:
         """Set the side lengths (blocks, 3) of the blocks, in which steps across their edges are measured."""
         self.boxes = boxes
 
-    @property
-    def lengths(self) -> tuple[Array, Array]:
-        """Return the side lengths of the blocks along the two directions of each parameter's face, (N,) each."""
-        a, b = tangent_axes(axis_and_side(self.cube_faces)[0])
-        return self.boxes[self.blocks, a], self.boxes[self.blocks, b]
-
     def place(self, parameters: Array, cube_faces: IntArray) -> None:
         """Set the parameters (N, 3) and their faces (N,)."""
         self.parameters, self.cube_faces = parameters, cube_faces
-        for known in ("window", "rows"):
-            self.__dict__.pop(known, None)
+        self.__dict__.pop("window", None)
 
     def on_nets(self, nets: ControlNets) -> "SlidingParameters":
         """Return the same parameters for blocks with other knots."""
@@ -131,36 +123,25 @@ class SlidingParameters:
         outward normals (N, 3) that would come to a place where F's boundary faces the other way: a few of them would
         fold F there. With `keep_layout`, steps that would flip a triangle are shortened.
         """
-        window, field = self.window, np.ascontiguousarray(control.reshape(3, -1))
-        polynomials, before = self._polynomials, self.on_faces
+        field, before = np.ascontiguousarray(control.reshape(3, -1)), self.on_faces
         longest = np.array([0.5 / max(shape) for shape in self.nets.shapes])
-        edges = next_faces(self.nets), self.boxes
         outward = np.zeros_like(points) if normals is None else normals
+        polynomials, edges, window = self._polynomials, (next_faces(self.nets), self.boxes), self.window
+        slid = FaceWindow.empty(len(points), self.nets.degree)
+        goal, parameters, cube_faces = *np.empty((2, *points.shape)), np.empty_like(self.cube_faces)
 
-        def part(rows: slice) -> tuple[Array, ...]:
-            known = (window.indices[rows], window.in_a[rows], window.in_b[rows])
-            at = (self.parameters[rows], self.cube_faces[rows], self.fixed[rows])
-            return _slid(polynomials, edges, *at, *known, field, points[rows], outward[rows], longest, reach)
+        def part(rows: slice) -> None:
+            here = self.parameters[rows], self.cube_faces[rows], self.fixed[rows], window.some(rows).arrays
+            aims = field, points[rows], outward[rows], longest, reach
+            found = goal[rows], parameters[rows], cube_faces[rows], slid.some(rows).arrays
+            _slide(polynomials, edges, *here, *aims, *found)
 
-        found = in_parallel(part, pieces(len(points)))
-        goal, parameters, cube_faces, *arrays = (np.concatenate(parts) for parts in zip(*found, strict=True))
+        in_parallel(part, pieces(len(points)))
         self.place(parameters, cube_faces)
-        self.window = FaceWindow(*arrays)
+        self.window = slid
         if keep_layout:
-            self._hold_back(*before, goal)
-
-    def _hold_back(self, parameters: Array, cube_faces: IntArray, goal: Array) -> None:
-        """Shorten steps from `parameters` towards `goal` until no further triangle flips."""
-        share = np.where((self.parameters == parameters).all(axis=1), 0.0, 1.0)
-        for _ in range(_HALVINGS):
-            blocked = new_flips(parameters, self.parameters, self.triangles)
-            if not blocked.any():
-                break
-            share[blocked] *= 0.5
-            moved = parameters + share[:, None] * (goal - parameters)
-            folded = fold_over_edges(self.nets, moved, cube_faces, self.fixed)
-            self.place(*folded)
-        self._keep(parameters, cube_faces, new_flips(parameters, self.parameters, self.triangles))
+            held = _held_back(edges, *before, *self.on_faces, self.fixed, goal, self.triangles)
+            self._change(*held)
 
     def at_closest_points(self, control: Array, points: Array, slides: int, sweeps: int) -> "SlidingParameters":
         """Return the parameters where F's boundary is closest to the points (N, 3), as far as no triangle flips.
@@ -190,18 +171,18 @@ class SlidingParameters:
         self._move(unflip(self.parameters, self.triangles, self.still))
 
     def _move(self, parameters: Array) -> None:
-        moved = np.abs(parameters - self.parameters).max(axis=1) > 1e-9
-        self._keep(parameters, nearest_faces(parameters), moved)
+        changed = np.asarray((np.abs(parameters - self.parameters) > 1e-9).any(axis=1))
+        moved = np.where(changed[:, None], parameters, self.parameters)
+        self._change(moved, np.where(changed, nearest_faces(moved), self.cube_faces), changed)
 
-    def _keep(self, parameters: Array, cube_faces: IntArray, chosen: Mask) -> None:
-        """Set these parameters for the chosen points; the basis functions of the others are not computed again."""
-        known = self.window
-        self.place(
-            np.where(chosen[:, None], parameters, self.parameters), np.where(chosen, cube_faces, self.cube_faces)
-        )
-        self.window = known.with_points(
-            chosen, FaceWindow.at(self._polynomials, parameters[chosen], cube_faces[chosen])
-        )
+    def _change(self, parameters: Array, cube_faces: IntArray, changed: Mask) -> None:
+        """Set the parameters and faces, of which some points (N,) have changed; the others keep their functions."""
+        if not changed.any():
+            return
+        own = FaceWindow.at(self._polynomials, parameters[changed], cube_faces[changed])
+        window = self.window.with_points(changed, own)
+        self.place(parameters, cube_faces)
+        self.window = window
 
     @cached_property
     def window(self) -> FaceWindow:
@@ -212,81 +193,106 @@ class SlidingParameters:
     def _polynomials(self) -> Polynomials:
         return polynomials_of(self.nets)
 
-    @cached_property
-    def rows(self) -> ControlRows:
-        """Return the rows that yield F at the points."""
-        return ControlRows(self.window.indices, self.window.weights(0, 0))
-
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def _slid(
+def _slide(
     polynomials: Polynomials,
     edges: Edges,
-    parameters: Array,
-    cube_faces: IntArray,
+    before: Array,
+    faces_before: IntArray,
     fixed: Mask,
-    indices: IntArray,
-    in_a: Array,
-    in_b: Array,
+    window: tuple[IntArray, Array, Array],
     control: Array,
     points: Array,
     normals: Array,
     max_steps: Array,
     reach: float,
-) -> tuple[Array, Array, IntArray, IntArray, Array, Array]:
-    """Compute the step of `SlidingParameters.slide` at points (N, 3) with a given FaceWindow.
+    goal: Array,
+    parameters: Array,
+    cube_faces: IntArray,
+    slid: tuple[IntArray, Array, Array],
+) -> None:
+    """Write the step of `SlidingParameters.slide` at points (N, 3) with a given FaceWindow.
 
-    Returns the ends of the steps in the planes of the faces (N, 3), the new parameters, their faces and their
+    The results are the ends of the steps in the planes of the faces (N, 3), the new parameters, their faces and their
     FaceWindow.
     """
-    goal, parameters, cube_faces = parameters.copy(), parameters.copy(), cube_faces.copy()
-    before, (old, old_a, old_b) = parameters.copy(), (indices, in_a, in_b)
-    indices, in_a, in_b = indices.copy(), in_a.copy(), in_b.copy()
-    found = np.empty((len(points), 3, 3))
+    (places, in_a, in_b), (new_places, new_a, new_b) = window, slid
+    found = np.empty((1, 3, 3))
     for n in range(len(points)):
-        fill_tangents(indices, in_a, in_b, control, n, found)
+        fill_tangents(places, in_a, in_b, control, n, found, 0)
         square = aa = bb = ab = ra = rb = 0.0
         for c in range(3):
-            off, along_a, along_b = found[n, 0, c] - points[n, c], found[n, 1, c], found[n, 2, c]
+            off, along_a, along_b = found[0, 0, c] - points[n, c], found[0, 1, c], found[0, 2, c]
             square += off * off
             aa, bb, ab = aa + along_a * along_a, bb + along_b * along_b, ab + along_a * along_b
             ra, rb = ra + along_a * off, rb + along_b * off
-        agreed = _agreement(found[n], normals[n], cube_faces[n])
+        face = faces_before[n]
+        agreed = agreement(found, 0, normals, n, face)
         step_a, step_b = damped_solution(aa, bb, ab, ra, rb, _DAMPING)
-        face = cube_faces[n]
-        free_a, free_b = not fixed[n, (face % 6 // 2 + 1) % 3], not fixed[n, (face % 6 // 2 + 2) % 3]
+        a, b = (face % 6 // 2 + 1) % 3, (face % 6 // 2 + 2) % 3
+        free_a, free_b = not fixed[n, a], not fixed[n, b]
         if not (free_a and free_b):
             step_a, step_b = free_a * ra / (aa + 1e-150), free_b * rb / (bb + 1e-150)
         share = min(1.0, max_steps[face // 6] / max(np.sqrt(step_a**2 + step_b**2), 1e-300))
-        goal[n, (face % 6 // 2 + 1) % 3] -= share * step_a
-        goal[n, (face % 6 // 2 + 2) % 3] -= share * step_b
-        if square > reach**2:
-            continue
         for c in range(3):
-            parameters[n, c] = goal[n, c]
-        _fold(edges, parameters, cube_faces, fixed, n)
-        fill_window(polynomials, parameters, cube_faces, n, indices, in_a, in_b)
-        fill_tangents(indices, in_a, in_b, control, n, found)
-        after = 0.0
-        for c in range(3):
-            after += (found[n, 0, c] - points[n, c]) ** 2
-        if after > square or _agreement(found[n], normals[n], cube_faces[n]) < min(agreed, 0.0):
+            goal[n, c] = before[n, c]
+        goal[n, a] -= share * step_a
+        goal[n, b] -= share * step_b
+        if square <= reach**2:
+            for c in range(3):
+                parameters[n, c] = goal[n, c]
             cube_faces[n] = face
-            write(before[n], parameters[n])
-            write(old[n], indices[n])
-            write(old_a[n], in_a[n])
-            write(old_b[n], in_b[n])
-    return goal, parameters, cube_faces, indices, in_a, in_b
+            _fold(edges, parameters, cube_faces, fixed, n)
+            fill_window(polynomials, parameters, cube_faces, n, new_places, new_a, new_b)
+            fill_tangents(new_places, new_a, new_b, control, n, found, 0)
+            after = 0.0
+            for c in range(3):
+                after += (found[0, 0, c] - points[n, c]) ** 2
+            if after <= square and agreement(found, 0, normals, n, cube_faces[n]) >= min(agreed, 0.0):
+                continue
+        cube_faces[n] = face
+        for c in range(3):
+            parameters[n, c], new_places[n, c] = before[n, c], places[n, c]
+        for order in range(2):
+            for i in range(in_a.shape[2]):
+                new_a[n, order, i], new_b[n, order, i] = in_a[n, order, i], in_b[n, order, i]
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def _agreement(found: Array, normal: Array, face: int) -> float:
-    """Return (t_a x t_b) . n with F and its tangents, the rows of `found`, and the outward normal n of a point."""
-    a, b = found[1], found[2]
-    size = (a[1] * b[2] - a[2] * b[1]) * normal[0]
-    size += (a[2] * b[0] - a[0] * b[2]) * normal[1]
-    size += (a[0] * b[1] - a[1] * b[0]) * normal[2]
-    return size if face % 2 == 1 else -size
+def _held_back(
+    edges: Edges,
+    before: Array,
+    faces_before: IntArray,
+    slid: Array,
+    slid_faces: IntArray,
+    fixed: Mask,
+    goal: Array,
+    triangles: IntArray,
+) -> tuple[Array, IntArray, Mask]:
+    """Shorten steps from `before` towards `goal`, at first up to `slid`, until no further triangle flips.
+
+    Returns the parameters, their faces, and the mask (N,) of the points that are no longer at `slid`.
+    """
+    parameters, cube_faces, changed = slid.copy(), slid_faces.copy(), np.zeros(len(slid), np.bool_)
+    share = np.zeros(len(slid))
+    for n in range(len(slid)):
+        for c in range(3):
+            if slid[n, c] != before[n, c]:  # others stay in any case
+                share[n] = 1.0
+    for halving in range(_HALVINGS + 1):
+        blocked, is_last = new_flips(before, parameters, triangles), halving == _HALVINGS
+        for n in range(len(slid)):
+            if blocked[n]:
+                share[n] = 0.0 if is_last else 0.5 * share[n]
+                changed[n], cube_faces[n] = True, faces_before[n]
+                for c in range(3):
+                    parameters[n, c] = before[n, c] + share[n] * (goal[n, c] - before[n, c])
+                if not is_last:
+                    _fold(edges, parameters, cube_faces, fixed, n)
+        if not blocked.any():
+            break
+    return parameters, cube_faces, changed
 
 
 def fold_over_edges(

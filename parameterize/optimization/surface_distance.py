@@ -5,12 +5,15 @@ F(p) - v and Q the mean of n n^T over the triangles around v: on smooth parts th
 normal only, on sharp edges across both sides, and at corners in all directions.
 """
 
+import numba
 import numpy as np
 
-from ..arrays import Array, Mask
+from ..arrays import Array, IntArray, Mask
 from ..spline.spline_map import ControlNets
 from ..surface.geometry import vertex_normals
-from .operators import PiecewiseOperator
+from ..threads import in_parallel
+from .face_window import fill_tangents
+from .operators import PiecewiseOperator, pieces
 from .sliding import SlidingParameters
 from .term import RoundWeights
 
@@ -71,13 +74,17 @@ class Correspondence:
 
     def energy_and_gradient(self, control: Array) -> tuple[float, Array]:
         """Return the sum of r^T Q r at the present parameters and its gradient (3, n)."""
-        residual = self.sliding.rows(control) - self.points  # (N, 3)
-        pulled = np.einsum("nij,nj->ni", self._metric, residual)
-        return float(np.vdot(residual, pulled)), 2.0 * self.sliding.rows.adjoint(pulled, control)
+        window, field = self.sliding.window, np.ascontiguousarray(control.reshape(3, -1))
+
+        def part(rows: slice) -> tuple[float, Array]:
+            return _pulled(window.some(rows).arrays, field, self.points[rows], self._metric[rows])
+
+        energies, pulled = zip(*in_parallel(part, pieces(len(self.points))), strict=True)
+        return sum(energies), sum(pulled[1:], start=pulled[0]).reshape(control.shape)
 
     def curvature(self, control: Array) -> PiecewiseOperator:
         """Return the second derivative of the energy for fixed parameters, as an operator in single precision."""
-        return self.sliding.rows.in_single().squared(2.0 * self._metric.astype(np.float32))
+        return self.sliding.window.rows(0, 0, np.float32).squared(2.0 * self._metric.astype(np.float32))
 
     def residuals(self, control: Array) -> Array:
         """Return the residuals F(p) - v, (N, 3)."""
@@ -86,3 +93,27 @@ class Correspondence:
     def mean_square(self, control: Array) -> float:
         """Return the mean of |F(p) - v|^2 at the present parameters."""
         return float(np.square(self.residuals(control)).sum(axis=1).mean())
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _pulled(window: tuple[IntArray, Array, Array], control: Array, points: Array, metric: Array) -> tuple[float, Array]:
+    """Return the sum of r^T Q r over the points of a FaceWindow, and its gradient, for control points (3, n).
+
+    points: (N, 3). metric: the matrices Q (N, 3, 3).
+    """
+    (places, in_a, in_b), gradient, energy = window, np.zeros_like(control), 0.0
+    width = in_a.shape[2]
+    found, residual = np.empty((1, 3, 3)), np.empty(3)
+    for n in range(len(points)):
+        fill_tangents(places, in_a, in_b, control, n, found, 0)
+        for c in range(3):
+            residual[c] = found[0, 0, c] - points[n, c]
+        for c in range(3):
+            pull = metric[n, c, 0] * residual[0] + metric[n, c, 1] * residual[1] + metric[n, c, 2] * residual[2]
+            energy += residual[c] * pull
+            for i in range(width):
+                share, column = 2.0 * in_a[n, 0, i] * pull, places[n, 0] + i * places[n, 1]
+                for j in range(width):
+                    gradient[c, column] += share * in_b[n, 0, j]
+                    column += places[n, 2]
+    return energy, gradient
