@@ -65,7 +65,7 @@ class BlockDistortion:
             return np.asarray(cofactors_and_determinants(self._grid.jacobian(control, planes))[1])
 
         weights = self._grid.weights
-        det = np.concatenate(in_parallel(part, self._grid.planes())).reshape(weights.shape)
+        det = self._grid.by_planes(in_parallel(part, self._grid.planes()))
         mass, volume = (self._grid.sum_on_spans(values) for values in (det * weights, weights))
         around = [2 * (count // 18) + 1 for count in mass.shape]
         mean = uniform_filter(mass, around, mode="nearest") / uniform_filter(volume, around, mode="nearest")
@@ -84,8 +84,8 @@ class BlockDistortion:
         def part(planes: slice) -> tuple[float, int, tuple[int, Floats]]:
             jacobian, weights = self._grid.jacobian(control, planes), self._weights(planes)
             cofactors, det = cofactors_and_determinants(jacobian)
-            short = np.maximum(self._floors[planes].ravel() - det, 0.0)
-            shortfall = self._short_weights[planes].ravel() * short
+            short = np.maximum(self._grid.flat(self._floors, planes) - det, 0.0)
+            shortfall = self._grid.flat(self._short_weights, planes) * short
             gap = jacobian - closest_rotations(jacobian)
             density = squared_norms(gap)
             excess = np.maximum(density - self.limit, 0.0)
@@ -113,8 +113,10 @@ class BlockDistortion:
             jacobian, weights = self._grid.jacobian(rough, planes), self._weights(planes).astype(np.float32)
             rotation = closest_rotations(jacobian)
             cofactors, det = cofactors_and_determinants(jacobian)
-            short_weights = self._short_weights[planes].ravel().astype(np.float32)
-            push = np.sqrt(2.0 * self.penalty * short_weights * (det < self._floors[planes].ravel())) * cofactors
+            short_weights = self._grid.flat(self._short_weights, planes).astype(np.float32)
+            push = (
+                np.sqrt(2.0 * self.penalty * short_weights * (det < self._grid.flat(self._floors, planes))) * cofactors
+            )
             gap = jacobian - rotation
             excess = np.maximum(squared_norms(gap) - self.limit, 0.0)
             pull = np.sqrt(8.0 * _STIFFENING * weights * (excess > 0.0)) * gap
@@ -131,7 +133,7 @@ class BlockDistortion:
         return PiecewiseOperator(list(products), self._grid.collect, lambda _: blocks)
 
     def _weights(self, planes: slice) -> Array:
-        return self._grid.weights[planes].ravel()
+        return self._grid.flat(self._grid.weights, planes)
 
 
 class DistortionTerm(Blockwise[BlockDistortion]):
