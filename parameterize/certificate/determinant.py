@@ -4,11 +4,10 @@ The control points of the three derivatives are brought to Bernstein form, and t
 product rule for Bernstein polynomials: of degree 3 p - 1 a direction. No interpolation, so that errors stay small.
 """
 
-import numba
 import numpy as np
 
 from ..arrays import Array, IntArray
-from ..spline.bernstein import add_products, binomials, cross_products, extraction
+from ..spline.bernstein import along_second_axis, binomials, cross_products, dot_products, extraction, windows
 from ..spline.bspline import breakpoints
 from ..spline.patch_groups import PatchGroup
 from ..threads import in_parallel
@@ -84,11 +83,7 @@ class DeterminantForm:
         """Return Bernstein coefficients on spans (k, 4), (d_u, d_v, d_w, k), and permanents (k,) that bound them."""
         local, sizes = zip(*(self._derivative(b, spans) for b in range(3)), strict=True)
         f_u, f_v, f_w = local  # (3, n_0, n_1, n_2, k) each, scaled Bernstein form
-        cross = cross_products(f_v, f_w)
-        determinant = np.zeros((*self.counts, len(spans)))
-        for one, other in zip(f_u, cross, strict=True):
-            add_products(one, other, 1.0, determinant)
-        determinant *= self.unscale
+        determinant = dot_products(f_u, cross_products(f_v, f_w)) * self.unscale
         (a, b, c), (d, e, f), (g, h, i) = np.stack(sizes, axis=1)
         return determinant, a * (e * i + f * h) + b * (d * i + f * g) + c * (d * h + e * g)
 
@@ -106,42 +101,15 @@ class DeterminantForm:
         magnitudes, shape = np.abs(net).max(axis=(1, 2, 3)), net.shape
         for axis, ((_, weights), number) in enumerate(zip(self.bases[b], spans.T[1:], strict=True)):
             matrices = np.ascontiguousarray(np.moveaxis(weights[number], 0, -1))
-            net = _times(matrices, net.reshape(int(np.prod(shape[: 1 + axis])), len(matrices), -1, len(spans)))
+            net = along_second_axis(
+                matrices, net.reshape(int(np.prod(shape[: 1 + axis])), len(matrices), -1, len(spans))
+            )
         return net.reshape(shape), magnitudes
 
     def _near(self, net: Array, b: int, spans: IntArray) -> Array:
         """Return those of the b-th derivative's control points (patches, c, ..) that spans (k, 4) need: (c, .., k)."""
         first = np.stack([start[number] for (start, _), number in zip(self.bases[b], spans.T[1:], strict=True)])
-        return _windows(net, spans[:, 0], first, tuple(weights.shape[1] for _, weights in self.bases[b]))
-
-
-@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def _windows(net: Array, patches: IntArray, first: IntArray, sizes: tuple[int, int, int]) -> Array:
-    """Return the control points of patches (k,) in (patches, c, N_0, N_1, N_2) from first (3, k) on: (c, *sizes, k)."""
-    found = np.empty((net.shape[1], sizes[0], sizes[1], sizes[2], first.shape[1]))
-    for c in range(net.shape[1]):
-        for i in range(sizes[0]):
-            for j in range(sizes[1]):
-                for m in range(sizes[2]):
-                    row = found[c, i, j, m]
-                    for k in range(row.size):
-                        row[k] = net[patches[k], c, first[0, k] + i, first[1, k] + j, first[2, k] + m]
-    return found
-
-
-@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def _times(matrices: Array, field: Array) -> Array:
-    """Apply matrices (n, n, k), one for each place of the last axis, along the second axis of a field (a, n, b, k)."""
-    applied = np.zeros_like(field)
-    for a in range(field.shape[0]):
-        for x in range(field.shape[1]):
-            for b in range(field.shape[2]):
-                total = applied[a, x, b]
-                for i in range(field.shape[1]):
-                    factor, value = matrices[x, i], field[a, i, b]
-                    for k in range(total.size):
-                        total[k] += factor[k] * value[k]
-    return applied
+        return windows(net, spans[:, 0], first, tuple(weights.shape[1] for _, weights in self.bases[b]))
 
 
 def _least_of_both(values: Array) -> Array:

@@ -5,7 +5,6 @@ import math
 import numba
 import numpy as np
 
-from ..array_copies import write
 from ..arrays import Array, IntArray, Mask
 from .cube import snap
 
@@ -42,29 +41,47 @@ def flipped(places: Array, faces: IntArray) -> Mask:
     """Return the mask (m,) of triangles (m, 3) that do not face outwards, with a margin for later rounding errors."""
     found = np.empty(len(faces), np.bool_)
     for t in range(len(faces)):
-        p0, p1, p2 = places[faces[t, 0]], places[faces[t, 1]], places[faces[t, 2]]
-        triple = 0.0
-        for c in range(3):
-            d, e = (c + 1) % 3, (c + 2) % 3
-            triple += (p0[c] - 0.5) * ((p1[d] - p0[d]) * (p2[e] - p0[e]) - (p1[e] - p0[e]) * (p2[d] - p0[d]))
-        found[t] = triple <= _FLAT
+        found[t] = _is_flipped(places, faces, t)
     return found
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def new_flips(before: Array, after: Array, faces: IntArray) -> Mask:
-    """Return the mask (n,) of points that must stay, so that no other triangle flips when the rest moves to `after`."""
-    stay, allowed, places = np.zeros(len(before), np.bool_), flipped(before, faces), after.copy()
+def _is_flipped(places: Array, faces: IntArray, t: int) -> bool:
+    """Return whether the t-th triangle does not face outwards."""
+    p0, p1, p2 = faces[t, 0], faces[t, 1], faces[t, 2]
+    triple = 0.0
+    for c in range(3):
+        d, e = (c + 1) % 3, (c + 2) % 3
+        ahead = (places[p1, d] - places[p0, d]) * (places[p2, e] - places[p0, e])
+        behind = (places[p1, e] - places[p0, e]) * (places[p2, d] - places[p0, d])
+        triple += (places[p0, c] - 0.5) * (ahead - behind)
+    return triple <= _FLAT
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def new_flips(after: Array, before: Array, faces: IntArray, allowed: Mask, moved: Mask) -> Mask:
+    """Return the mask (n,) of points that must stay, so that no other triangle flips when the rest moves to `after`.
+
+    allowed: the mask (m,) of the triangles that may be flipped. moved: the mask (n,) of the points of which other
+    places are known to flip no triangle.
+    """
+    stay, places, touched = np.zeros(len(before), np.bool_), after.copy(), moved.copy()
     for _ in range(_HOLDING_ROUNDS):
-        bad, is_done = flipped(places, faces), True
+        is_done, held = True, np.zeros(len(before), np.bool_)
         for t in range(len(faces)):
-            if bad[t] and not allowed[t]:
+            is_near = touched[faces[t, 0]] or touched[faces[t, 1]] or touched[faces[t, 2]]
+            if is_near and not allowed[t] and _is_flipped(places, faces, t):
                 is_done = False
-                for corner in faces[t]:
-                    stay[corner] = True
-                    write(before[corner], places[corner])
+                for k in range(3):
+                    held[faces[t, k]] = True
         if is_done:
             return stay
+        for n in range(len(before)):
+            touched[n] = held[n] and not stay[n]
+            if touched[n]:
+                stay[n] = True
+                for c in range(3):
+                    places[n, c] = before[n, c]
     stay[:] = True
     return stay
 

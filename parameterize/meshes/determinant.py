@@ -13,7 +13,7 @@ from itertools import product
 import numpy as np
 
 from ..arrays import Array, IntArray
-from ..spline.bernstein import add_products, cross_products, split
+from ..spline.bernstein import cross_products, dot_products, split
 from ..threads import in_parallel
 from .bezier import (
     multinomial,
@@ -124,10 +124,7 @@ class ElementForm:
             lengths.append(np.linalg.norm(net, axis=1).max(axis=0) + np.linalg.norm(errors[-1], axis=0))
         if self.is_simplex:
             lengths += self._other_lengths(slopes, lengths, errors)
-        cross = cross_products(slopes[1], slopes[2])
-        determinant = np.zeros((*self.counts, count))
-        for one, other in zip(slopes[0], cross, strict=True):
-            add_products(one, other, 1.0, determinant)
+        determinant = dot_products(slopes[0], cross_products(slopes[1], slopes[2]))
         if self.is_simplex:
             values = determinant[tuple(self.places.T)] / self.factors[:, None]
         else:

@@ -99,7 +99,8 @@ class BlockDeterminants:
         self.floor = floor
         self._extractions = [extraction(k, degree) for k in knots]
         self._widths = [np.diff(breakpoints(k)) for k in knots]
-        whole, lowered = binomials(degree), degree * binomials(degree - 1)
+        self._whole = whole = binomials(degree)
+        lowered = degree * binomials(degree - 1)
         self._scales = tuple(  # from differences of Bezier points to derivatives in scaled Bernstein form
             np.einsum("i,j,k->ijk", *(lowered if d == axis else whole for d in range(3))) for axis in range(3)
         )
@@ -173,7 +174,7 @@ class BlockDeterminants:
     def _short_rows(self, control: Array, spans: _PenaltySpans) -> _Rows:
         """Return the rows of the coefficients that lie below the floor on some spans."""
         of_spans = spans.first, spans.weights, spans.volumes, spans.floors
-        chosen, shortfall, rows, starts = short_rows(control, *of_spans, self._scales, self._unscale)
+        chosen, shortfall, rows, starts = short_rows(control, *of_spans, self._whole, self._scales, self._unscale)
         spans = spans.some(chosen)
         return _Rows(spans, shortfall, spans.shares.repeat(np.diff(starts)), rows, starts)
 

@@ -7,31 +7,36 @@ import numba
 import numpy as np
 
 from ..arrays import Array, IntArray
-from ..spline.bernstein import add_products, cross_products
+from ..spline.bernstein import along_second_axis, cross_products, dot_products, windows
 
 Three = tuple[Array, Array, Array]  # one array a direction
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def short_rows(
-    control: Array, first: IntArray, weights: Array, volumes: Array, floors: Array, scales: Three, unscale: Array
+    control: Array,
+    first: IntArray,
+    weights: Array,
+    volumes: Array,
+    floors: Array,
+    whole: Array,
+    scales: Three,
+    unscale: Array,
 ) -> tuple[IntArray, Array, Array, IntArray]:
     """Return the spans (k,) that have coefficients below their floors, and these coefficients, span by span.
 
     For the coefficients, return the shortfalls (r,), the derivatives (r, 3, n, n, n) in the span's Bezier points, and
     the first row of each span (k + 1,).
 
-    first, weights, volumes, floors: of the spans to be examined, as in determinant_penalty.py. scales: from differences
-    of Bezier points to derivatives of F in scaled Bernstein form. unscale: (q, q, q), from there to the coefficients.
+    first, weights, volumes, floors: of the spans to be examined, as in determinant_penalty.py. whole: (n,), the
+    binomials of degree n - 1. scales: from differences of Bezier points to derivatives of F in scaled Bernstein form.
+    unscale: (q, q, q), from there to the coefficients.
     """
     spans, n = len(first), weights.shape[2]
     points = _bezier_points(control, first, weights)
     slopes = [_derivative(points, scale, direction) for direction, scale in enumerate(scales)]
-    by_u = cross_products(slopes[1], slopes[2])
-    short = np.zeros((*unscale.shape, spans))
-    for c in range(3):
-        add_products(slopes[0][c], by_u[c], 1.0, short)
-    short = short.reshape(unscale.size, spans)
+    crosses = [cross_products(slopes[1], slopes[2])]
+    short = dot_products(slopes[0], crosses[0]).reshape(unscale.size, spans)
     factors, counts, chosen, rest = unscale.ravel(), np.zeros(spans, np.int64), np.empty(spans, np.int64), 0
     for i in range(len(factors)):
         for s in range(spans):
@@ -44,34 +49,56 @@ def short_rows(
     chosen, starts = chosen[:rest], np.zeros(rest + 1, np.int64)
     for k in range(rest):
         starts[k + 1] = starts[k] + counts[chosen[k]]
-    shortfall, rows = np.empty(starts[-1]), np.zeros((starts[-1], 3, n, n, n))
-    slopes = [_on_chosen(slope, chosen) for slope in slopes]
-    for direction in range(3):
-        crossed = cross_products(slopes[(direction + 1) % 3], slopes[(direction + 2) % 3])
-        for k in range(rest):
-            s, r = chosen[k], starts[k]
-            own = _on_one(crossed, k)
-            for i in range(len(factors)):
-                if short[i, s] > 0.0:
-                    shortfall[r] = short[i, s]
-                    _add_derivatives(i, own, scales[direction], factors[i] / volumes[s], direction, rows[r])
-                    r += 1
+    slopes, crosses = [_on_chosen(slope, chosen) for slope in slopes], [_on_chosen(crosses[0], chosen)]
+    for direction in range(1, 3):
+        crosses.append(cross_products(slopes[(direction + 1) % 3], slopes[(direction + 2) % 3]))
+    shortfall, rows, sums = (
+        np.empty(starts[-1]),
+        np.zeros((starts[-1], 3, n, n, n)),
+        np.empty((3, 4, 2 * n, 2 * n, 2 * n)),
+    )
+    for k in range(rest):
+        s, r = chosen[k], starts[k]
+        _write_sums(crosses, k, sums)
+        for i in range(len(factors)):
+            if short[i, s] > 0.0:
+                shortfall[r] = short[i, s]
+                _write_derivatives(i, sums, whole, factors[i] / volumes[s], rows[r])
+                r += 1
     return chosen, shortfall, rows, starts
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _bezier_points(control: Array, first: IntArray, weights: Array) -> Array:
+    """Return the Bezier points (3, n, n, n, k) of spans with first control points (k, 3) and weights (k, 3, n, n)."""
+    spans, n = len(first), weights.shape[2]
+    one, starts = np.zeros(spans, np.int64), np.ascontiguousarray(first.T)
+    points = windows(control.reshape(1, *control.shape), one, starts, (n, n, n)).reshape(1, 3, n**3, spans)
+    for axis in range(3):
+        matrices = np.empty((n, n, spans))
+        for i in range(n):
+            for j in range(n):
+                for s in range(spans):
+                    matrices[i, j, s] = weights[s, axis, i, j]
+        sizes = 3 * n**axis, n, n ** (2 - axis), spans
+        points = along_second_axis(matrices, points.reshape(sizes))
+    return points.reshape(3, n, n, n, spans)
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def _derivative(points: Array, scale: Array, direction: int) -> Array:
-    """Return a derivative of F (3, ..., k) in scaled Bernstein form, from Bezier points (k, 3, n, n, n)."""
+    """Return a derivative of F (3, ..., k) in scaled Bernstein form, from Bezier points (3, n, n, n, k)."""
     n_u, n_v, n_w = scale.shape
     to_u, to_v, to_w = direction == 0, direction == 1, direction == 2
-    found = np.empty((3, n_u, n_v, n_w, len(points)))
-    for s in range(len(points)):
-        for c in range(3):
-            for i in range(n_u):
-                for j in range(n_v):
-                    for k in range(n_w):
-                        change = points[s, c, i + to_u, j + to_v, k + to_w] - points[s, c, i, j, k]
-                        found[c, i, j, k, s] = change * scale[i, j, k]
+    found = np.empty((3, n_u, n_v, n_w, points.shape[4]))
+    for c in range(3):
+        for i in range(n_u):
+            for j in range(n_v):
+                for k in range(n_w):
+                    here, ahead = points[c, i, j, k], points[c, i + to_u, j + to_v, k + to_w]
+                    out, factor = found[c, i, j, k], scale[i, j, k]
+                    for s in range(out.size):
+                        out[s] = (ahead[s] - here[s]) * factor
     return found
 
 
@@ -90,55 +117,47 @@ def _on_chosen(fields: Array, chosen: IntArray) -> Array:
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def _on_one(fields: Array, span: int) -> Array:
-    """Return the fields (3, ..., k) on one span, in one piece."""
-    size, n_u, n_v, n_w, _ = fields.shape
-    found = np.empty((size, n_u, n_v, n_w))
-    for c in range(size):
-        for i in range(n_u):
-            for j in range(n_v):
-                for k in range(n_w):
-                    found[c, i, j, k] = fields[c, i, j, k, span]
-    return found
+def _write_sums(crosses: list[Array], span: int, sums: Array) -> None:
+    """Write what `_write_derivatives` needs of a span: sums (3, 4, 2 n, 2 n, 2 n).
 
-
-@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def _add_derivatives(place: int, cross: Array, scale: Array, share: float, direction: int, row: Array) -> None:
-    """Add to a row (3, n, n, n) the derivatives of a coefficient in the Bezier points, by one derivative of F.
-
-    place: the number of the coefficient. cross: (3, ...), the product of the two other derivatives of F. scale: the
-    factor from differences of Bezier points to the control net of that derivative.
+    With X_d the cross product of the derivatives of F but the d-th, and e_d the step in direction d, these are for
+    each m the numbers X_d(m + e_d) + X_d(m) of the three directions, and (n - 1) times the sum of all X_d(m). An entry
+    of X outside is 0, and m starts at -1 in each direction.
     """
-    size_u, size_v, size_w = cross.shape[1], cross.shape[2], cross.shape[3]
-    count = size_w + scale.shape[2] - 1  # of the coefficients in each direction
-    a, b, c = place // count**2, place // count % count, place % count
-    step_u, step_v, step_w = direction == 0, direction == 1, direction == 2
-    for component in range(3):
-        for i in range(max(0, a - size_u + 1), min(scale.shape[0], a + 1)):
-            for j in range(max(0, b - size_v + 1), min(scale.shape[1], b + 1)):
-                here, ahead = row[component, i, j], row[component, i + step_u, j + step_v]
-                factors, others = scale[i, j], cross[component, a - i, b - j]
-                for k in range(max(0, c - size_w + 1), min(scale.shape[2], c + 1)):
-                    change = share * factors[k] * others[c - k]
-                    here[k] -= change
-                    ahead[k + step_w] += change
+    sums[:] = 0.0
+    last = sums.shape[2] // 2 - 1
+    for d in range(3):
+        cross, u, v, w = crosses[d], d == 0, d == 1, d == 2
+        for c in range(3):
+            for i in range(cross.shape[1]):
+                for j in range(cross.shape[2]):
+                    for k in range(cross.shape[3]):
+                        value = cross[c, i, j, k, span]
+                        sums[c, d, i + 1, j + 1, k + 1] += value
+                        sums[c, d, i + 1 - u, j + 1 - v, k + 1 - w] += value
+                        sums[c, 3, i + 1, j + 1, k + 1] += last * value
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def _bezier_points(control: Array, first: IntArray, weights: Array) -> Array:
-    """Return the Bezier points (k, 3, n, n, n) of spans with first control points (k, 3) and weights (k, 3, n, n)."""
-    spans, n = len(first), weights.shape[2]
-    points = np.empty((spans, 3, n**3), control.dtype)
-    for s in range(spans):
-        u, v, w = first[s]
-        for c in range(3):
-            field = points[s, c]
-            for i in range(n):
-                for j in range(n):
-                    for k in range(n):
-                        field[(i * n + j) * n + k] = control[c, u + i, v + j, w + k]
-            _along_axes(field, weights[s, 0], weights[s, 1], weights[s, 2])
-    return points.reshape(spans, 3, n, n, n)
+def _write_derivatives(place: int, sums: Array, whole: Array, share: float, row: Array) -> None:
+    """Write a row (3, n, n, n), `share` times the derivatives of a coefficient in scaled form in the Bezier points.
+
+    place: the number of the coefficient. whole: C(n - 1, i). With the sums S of `_write_sums` at the place minus
+    (i, j, k), the derivative in the point (i, j, k) is C(n - 1, i) C(n - 1, j) C(n - 1, k) (i S_0 + j S_1 + k S_2 -
+    S_3), because (n - 1) C(n - 2, i - 1) = i C(n - 1, i).
+    """
+    n = len(whole)
+    count, wide = 3 * n - 3, 2 * n
+    a, b, c = place // count**2 + 1, place // count % count + 1, place % count + 1  # of the entry for i = j = k = 0
+    for component in range(3):
+        for i in range(max(0, a - wide + 1), min(n, a + 1)):
+            for j in range(max(0, b - wide + 1), min(n, b + 1)):
+                factor, out = share * whole[i] * whole[j], row[component, i, j]
+                in_u, in_v = sums[component, 0, a - i, b - j], sums[component, 1, a - i, b - j]
+                in_w, rest = sums[component, 2, a - i, b - j], sums[component, 3, a - i, b - j]
+                for k in range(max(0, c - wide + 1), min(n, c + 1)):
+                    m = c - k
+                    out[k] = factor * whole[k] * (i * in_u[m] + j * in_v[m] + k * in_w[m] - rest[m])
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]

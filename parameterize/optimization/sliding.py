@@ -13,7 +13,7 @@ import numpy as np
 
 from ..arrays import Array, IntArray, Knots, Mask
 from ..cube.cube import damped_solution, nearest_faces
-from ..cube.flips import new_flips, unflip, untangle, untangle_whole
+from ..cube.flips import flipped, new_flips, unflip, untangle, untangle_whole
 from ..spline.bspline import breakpoints
 from ..spline.spline_map import ControlNets
 from ..threads import in_parallel
@@ -275,22 +275,22 @@ def _held_back(
     Returns the parameters, their faces, and the mask (N,) of the points that are no longer at `slid`.
     """
     parameters, cube_faces, changed = slid.copy(), slid_faces.copy(), np.zeros(len(slid), np.bool_)
-    share = np.zeros(len(slid))
+    moved, share, allowed = np.zeros(len(slid), np.bool_), np.ones(len(slid)), flipped(before, triangles)
     for n in range(len(slid)):
         for c in range(3):
-            if slid[n, c] != before[n, c]:  # others stay in any case
-                share[n] = 1.0
+            moved[n] |= slid[n, c] != before[n, c]
+        share[n] = 1.0 if moved[n] else 0.0  # others stay in any case
     for halving in range(_HALVINGS + 1):
-        blocked, is_last = new_flips(before, parameters, triangles), halving == _HALVINGS
+        is_last, moved = halving == _HALVINGS, new_flips(parameters, before, triangles, allowed, moved)
         for n in range(len(slid)):
-            if blocked[n]:
+            if moved[n]:
                 share[n] = 0.0 if is_last else 0.5 * share[n]
                 changed[n], cube_faces[n] = True, faces_before[n]
                 for c in range(3):
                     parameters[n, c] = before[n, c] + share[n] * (goal[n, c] - before[n, c])
                 if not is_last:
                     _fold(edges, parameters, cube_faces, fixed, n)
-        if not blocked.any():
+        if not moved.any():
             break
     return parameters, cube_faces, changed
 

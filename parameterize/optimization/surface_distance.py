@@ -12,7 +12,6 @@ from ..arrays import Array, IntArray, Mask
 from ..spline.spline_map import ControlNets
 from ..surface.geometry import vertex_normals
 from ..threads import in_parallel
-from .face_window import fill_tangents
 from .operators import PiecewiseOperator, pieces
 from .sliding import SlidingParameters
 from .term import RoundWeights
@@ -103,11 +102,16 @@ def _pulled(window: tuple[IntArray, Array, Array], control: Array, points: Array
     """
     (places, in_a, in_b), gradient, energy = window, np.zeros_like(control), 0.0
     width = in_a.shape[2]
-    found, residual = np.empty((1, 3, 3)), np.empty(3)
+    residual = np.empty(3)
     for n in range(len(points)):
-        fill_tangents(places, in_a, in_b, control, n, found, 0)
         for c in range(3):
-            residual[c] = found[0, 0, c] - points[n, c]
+            residual[c] = -points[n, c]
+            for i in range(width):
+                value, column = 0.0, places[n, 0] + i * places[n, 1]
+                for j in range(width):
+                    value += in_b[n, 0, j] * control[c, column]
+                    column += places[n, 2]
+                residual[c] += in_a[n, 0, i] * value
         for c in range(3):
             pull = metric[n, c, 0] * residual[0] + metric[n, c, 1] * residual[1] + metric[n, c, 2] * residual[2]
             energy += residual[c] * pull

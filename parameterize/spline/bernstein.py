@@ -45,6 +45,35 @@ def binomials(degree: int) -> Array:
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def windows(net: Array, patches: IntArray, first: IntArray, sizes: tuple[int, int, int]) -> Array:
+    """Return the control points of patches (k,) in (patches, c, N_0, N_1, N_2) from first (3, k) on: (c, *sizes, k)."""
+    found = np.empty((net.shape[1], sizes[0], sizes[1], sizes[2], first.shape[1]))
+    for c in range(net.shape[1]):
+        for i in range(sizes[0]):
+            for j in range(sizes[1]):
+                for m in range(sizes[2]):
+                    row = found[c, i, j, m]
+                    for k in range(row.size):
+                        row[k] = net[patches[k], c, first[0, k] + i, first[1, k] + j, first[2, k] + m]
+    return found
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def along_second_axis(matrices: Array, field: Array) -> Array:
+    """Apply matrices (n, n, k), one for each place of the last axis, along the second axis of a field (a, n, b, k)."""
+    applied = np.zeros_like(field)
+    for a in range(field.shape[0]):
+        for x in range(field.shape[1]):
+            for b in range(field.shape[2]):
+                total = applied[a, x, b]
+                for i in range(field.shape[1]):
+                    factor, value = matrices[x, i], field[a, i, b]
+                    for k in range(total.size):
+                        total[k] += factor[k] * value[k]
+    return applied
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def add_products(a: Array, b: Array, sign: float, out: Array) -> None:
     """Add sign * a * b to out: trivariate polynomials in scaled Bernstein form, one for each place of the last axis.
 
@@ -64,13 +93,42 @@ def add_products(a: Array, b: Array, sign: float, out: Array) -> None:
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def dot_products(a: Array, b: Array) -> Array:
+    """Return the inner products of vectors (3, n_0, n_1, n_2, k) and (3, m_0, m_1, m_2, k) in scaled Bernstein form."""
+    sizes = a.shape[1] + b.shape[1] - 1, a.shape[2] + b.shape[2] - 1, a.shape[3] + b.shape[3] - 1
+    products = np.zeros((*sizes, a.shape[4]))
+    for i0 in range(a.shape[1]):
+        for j0 in range(b.shape[1]):
+            for i1 in range(a.shape[2]):
+                for j1 in range(b.shape[2]):
+                    for i2 in range(a.shape[3]):
+                        a0, a1, a2 = a[0, i0, i1, i2], a[1, i0, i1, i2], a[2, i0, i1, i2]
+                        for j2 in range(b.shape[3]):
+                            b0, b1, b2 = b[0, j0, j1, j2], b[1, j0, j1, j2], b[2, j0, j1, j2]
+                            total = products[i0 + j0, i1 + j1, i2 + j2]
+                            for k in range(total.size):
+                                total[k] += a0[k] * b0[k] + a1[k] * b1[k] + a2[k] * b2[k]
+    return products
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def cross_products(a: Array, b: Array) -> Array:
     """Return the cross products of vectors (3, n_0, n_1, n_2, k) and (3, m_0, m_1, m_2, k) in scaled Bernstein form."""
-    n_0, n_1, n_2 = a.shape[1] + b.shape[1] - 1, a.shape[2] + b.shape[2] - 1, a.shape[3] + b.shape[3] - 1
-    products = np.zeros((3, n_0, n_1, n_2, a.shape[4]))
+    sizes = a.shape[1] + b.shape[1] - 1, a.shape[2] + b.shape[2] - 1, a.shape[3] + b.shape[3] - 1
+    products = np.zeros((3, *sizes, a.shape[4]))
     for c in range(3):
-        add_products(a[(c + 1) % 3], b[(c + 2) % 3], 1.0, products[c])
-        add_products(a[(c + 2) % 3], b[(c + 1) % 3], -1.0, products[c])
+        p, q = (c + 1) % 3, (c + 2) % 3
+        for i0 in range(a.shape[1]):
+            for j0 in range(b.shape[1]):
+                for i1 in range(a.shape[2]):
+                    for j1 in range(b.shape[2]):
+                        for i2 in range(a.shape[3]):
+                            a_p, a_q = a[p, i0, i1, i2], a[q, i0, i1, i2]
+                            for j2 in range(b.shape[3]):
+                                b_p, b_q = b[p, j0, j1, j2], b[q, j0, j1, j2]
+                                total = products[c, i0 + j0, i1 + j1, i2 + j2]
+                                for k in range(total.size):
+                                    total[k] += a_p[k] * b_q[k] - a_q[k] * b_p[k]
     return products
 
 
