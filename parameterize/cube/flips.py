@@ -178,7 +178,12 @@ def untangle_whole(parameters: Array, faces: IntArray, sweeps: int = _SWEEPS, st
     return parameters if flipped(untangled, faces).any() else untangled
 
 
+@numba.njit(cache=True, nogil=True, error_model="numpy")  # type: ignore[untyped-decorator]
 def _directions(parameters: Array) -> Array:
     """Return unit vectors from the cube's centre to its points (n, 3)."""
-    direction = parameters - 0.5
-    return np.asarray(direction / np.linalg.norm(direction, axis=1, keepdims=True))
+    found = np.empty_like(parameters)
+    for n in range(len(parameters)):
+        x, y, z = parameters[n, 0] - 0.5, parameters[n, 1] - 0.5, parameters[n, 2] - 0.5
+        length = math.sqrt(x * x + y * y + z * z)
+        found[n, 0], found[n, 1], found[n, 2] = x / length, y / length, z / length
+    return found

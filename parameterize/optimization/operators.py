@@ -44,12 +44,17 @@ def pieces(count: int) -> list[slice]:
 
 
 def weighted_sum(terms: list[tuple[float, PiecewiseOperator]]) -> PiecewiseOperator:
-    """Return the sum of operators times their weights, as an operator that runs the pieces of all in one call."""
+    """Return the sum of operators times their weights, as an operator that runs the pieces of all in one call.
+
+    Each operator gives a new array, which may be overwritten.
+    """
 
     def add(found: list[Any], x: Floats) -> Floats:
         total, rest = np.zeros_like(x), iter(found)
         for weight, operator in terms:
-            total += weight * operator.add(list(islice(rest, len(operator.pieces))), x)
+            part = operator.add(list(islice(rest, len(operator.pieces))), x)
+            part *= weight
+            total += part
         return total
 
     def diagonal(like: Floats) -> Floats:

@@ -10,6 +10,7 @@ Several blocks keep to K alone: each block has its own inverse, and scaled inver
 hand of several blocks folded in 499 spans as it approached its surface, and in none without.
 """
 
+import numba
 import numpy as np
 
 from ..arrays import Array, Floats
@@ -42,8 +43,7 @@ class Preconditioner:
             self._inverses.append(KroneckerInverse(rough, term.mass, dtype=np.float32))
             entries.append(_diagonal(rough, term.mass).ravel())
         self._entries = np.concatenate(entries)
-        one = np.ones(len(self._entries), np.float32)
-        self._factors: Floats = np.stack([one, 0 * one, one, 0 * one, 0 * one, one])
+        self._factors: Floats | None = None
 
     def scale(self, blocks: Floats) -> None:
         """Set the blocks (6, n) on the diagonal of the second derivative, as operators.py explains them."""
@@ -51,17 +51,34 @@ class Preconditioner:
 
     def __call__(self, residual: Floats) -> Floats:
         """Return the inverse applied to a residual (3, n)."""
-        nets, (a, b, c, d, e, f) = self._nets, self._factors
-        x, y, z = residual
-        x = x * a
-        y = (y - b * x) * c
-        z = (z - d * x - e * y) * f
-        scaled = np.stack([x, y, z])
-        x, y, z = nets.joined([part(nets.of_block(scaled, block)) for block, part in enumerate(self._inverses)])
-        z = z * f
-        y = (y - e * z) * c
-        x = (x - b * y - d * z) * a
-        return nets.merged(np.stack([x, y, z]))
+        nets, factors = self._nets, self._factors
+        scaled = residual if factors is None else _forward(factors, residual)
+        found = nets.joined([part(nets.of_block(scaled, block)) for block, part in enumerate(self._inverses)])
+        return nets.merged(found if factors is None else _backward(factors, found))
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _forward(factors: Floats, right: Floats) -> Floats:
+    """Return the solution of L x = right, (3, n), with factors L as `_cholesky` returns them."""
+    found = np.empty_like(right)
+    a, b, c, d, e, f = factors
+    for i in range(right.shape[1]):
+        x = right[0, i] * a[i]
+        y = (right[1, i] - b[i] * x) * c[i]
+        found[0, i], found[1, i], found[2, i] = x, y, (right[2, i] - d[i] * x - e[i] * y) * f[i]
+    return found
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _backward(factors: Floats, right: Floats) -> Floats:
+    """Return the solution of L^T x = right, (3, n), with factors L as `_cholesky` returns them."""
+    found = np.empty_like(right)
+    a, b, c, d, e, f = factors
+    for i in range(right.shape[1]):
+        z = right[2, i] * f[i]
+        y = (right[1, i] - e[i] * z) * c[i]
+        found[0, i], found[1, i], found[2, i] = (right[0, i] - b[i] * y - d[i] * z) * a[i], y, z
+    return found
 
 
 def _diagonal(matrices: tuple[Array, ...], mass: tuple[Array, ...]) -> Array:

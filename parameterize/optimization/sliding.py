@@ -171,9 +171,12 @@ class SlidingParameters:
         self._move(unflip(self.parameters, self.triangles, self.still))
 
     def _move(self, parameters: Array) -> None:
-        changed = np.asarray((np.abs(parameters - self.parameters) > 1e-9).any(axis=1))
+        x, y, z = (np.abs(parameters - self.parameters) > 1e-9).T
+        changed = x | y | z
         moved = np.where(changed[:, None], parameters, self.parameters)
-        self._change(moved, np.where(changed, nearest_faces(moved), self.cube_faces), changed)
+        cube_faces = self.cube_faces.copy()
+        cube_faces[changed] = nearest_faces(moved[changed])
+        self._change(moved, cube_faces, changed)
 
     def _change(self, parameters: Array, cube_faces: IntArray, changed: Mask) -> None:
         """Set the parameters and faces, of which some points (N,) have changed; the others keep their functions."""

@@ -66,7 +66,8 @@ class ControlNets:
 
     def joined(self, parts: list[Floats]) -> Floats:
         """Return the control points (3, n) of all blocks from those of each block, (3, n_u, n_v, n_w)."""
-        return np.concatenate([part.reshape(3, -1) for part in parts], axis=1)
+        flat = [part.reshape(3, -1) for part in parts]
+        return flat[0] if len(flat) == 1 else np.concatenate(flat, axis=1)
 
     @cached_property
     def _shared(self) -> tuple[IntArray, IntArray, Array]:
