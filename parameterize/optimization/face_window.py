@@ -130,13 +130,12 @@ def fill_window(
 def _fill_values(polynomials: Polynomials, direction: int, x: float, n: int, out: Array) -> int:
     """Write row n of values and derivatives (N, 2, p + 1); return the number of the first function that is not zero."""
     starts, begins, first, coefficients, _ = polynomials
-    low, high = starts[direction], starts[direction + 1]
-    while high - low > 1:  # the last span that begins at x or before
-        middle = (low + high) // 2
-        if begins[middle] <= x:
-            low = middle
-        else:
-            high = middle
+    begin, end = starts[direction], starts[direction + 1]
+    low = begin + min(max(int(x * (end - begin)), 0), end - begin - 1)  # the span, where all are equally long
+    while low > begin and begins[low] > x:
+        low -= 1
+    while low < end - 1 and begins[low + 1] <= x:
+        low += 1
     step, width = x - begins[low], out.shape[2]
     for i in range(width):
         value, slope = coefficients[low, width - 1, i], 0.0
