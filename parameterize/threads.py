@@ -35,7 +35,7 @@ def in_parallel(task: Callable[[Piece], Result], pieces: Sequence[Piece], thread
 
     The calling thread works, too: it would else wait, and small pieces are done before another thread wakes up.
     """
-    threads = min(threads or default_threads(), len(pieces))
+    threads = min(threads or default_threads(), len(pieces)) if len(pieces) > 1 else 1
     if threads < 2:
         return [task(piece) for piece in pieces]
     results: list[Any] = [None] * len(pieces)

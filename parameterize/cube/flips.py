@@ -24,15 +24,23 @@ def orientation(places: Array, faces: IntArray) -> tuple[Array, Array]:
     The product is positive where a triangle faces outwards, seen from the centre. On a common face of the cube two of
     the three components of the cross product vanish exactly.
     """
-    triple, noise = np.zeros(len(faces)), np.zeros(len(faces))
+    triple, noise = np.empty(len(faces)), np.empty(len(faces))
     for t in range(len(faces)):
-        p0, p1, p2 = places[faces[t, 0]], places[faces[t, 1]], places[faces[t, 2]]
-        for c in range(3):
-            d, e = (c + 1) % 3, (c + 2) % 3
-            ahead = (p1[d] - p0[d]) * (p2[e] - p0[e])
-            behind = (p1[e] - p0[e]) * (p2[d] - p0[d])
-            triple[t] += (p0[c] - 0.5) * (ahead - behind)
-            noise[t] += _ROUNDING * abs(p0[c] - 0.5) * (abs(ahead) + abs(behind))
+        triple[t], noise[t] = _orientation(places, faces, t)
+    return triple, noise
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _orientation(places: Array, faces: IntArray, t: int) -> tuple[float, float]:
+    """Return `orientation` of the t-th triangle."""
+    p0, p1, p2 = faces[t, 0], faces[t, 1], faces[t, 2]
+    triple, noise = 0.0, 0.0
+    for c in range(3):
+        d, e = (c + 1) % 3, (c + 2) % 3
+        ahead = (places[p1, d] - places[p0, d]) * (places[p2, e] - places[p0, e])
+        behind = (places[p1, e] - places[p0, e]) * (places[p2, d] - places[p0, d])
+        triple += (places[p0, c] - 0.5) * (ahead - behind)
+        noise += _ROUNDING * abs(places[p0, c] - 0.5) * (abs(ahead) + abs(behind))
     return triple, noise
 
 
@@ -41,36 +49,23 @@ def flipped(places: Array, faces: IntArray) -> Mask:
     """Return the mask (m,) of triangles (m, 3) that do not face outwards, with a margin for later rounding errors."""
     found = np.empty(len(faces), np.bool_)
     for t in range(len(faces)):
-        found[t] = _is_flipped(places, faces, t)
+        found[t] = _orientation(places, faces, t)[0] <= _FLAT
     return found
-
-
-@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def _is_flipped(places: Array, faces: IntArray, t: int) -> bool:
-    """Return whether the t-th triangle does not face outwards."""
-    p0, p1, p2 = faces[t, 0], faces[t, 1], faces[t, 2]
-    triple = 0.0
-    for c in range(3):
-        d, e = (c + 1) % 3, (c + 2) % 3
-        ahead = (places[p1, d] - places[p0, d]) * (places[p2, e] - places[p0, e])
-        behind = (places[p1, e] - places[p0, e]) * (places[p2, d] - places[p0, d])
-        triple += (places[p0, c] - 0.5) * (ahead - behind)
-    return triple <= _FLAT
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def new_flips(after: Array, before: Array, faces: IntArray, allowed: Mask, moved: Mask) -> Mask:
     """Return the mask (n,) of points that must stay, so that no other triangle flips when the rest moves to `after`.
 
-    allowed: the mask (m,) of the triangles that may be flipped. moved: the mask (n,) of the points of which other
-    places are known to flip no triangle.
+    allowed: the mask (m,) of the triangles that may be flipped. moved: the mask (n,) of points; triangles of other
+    points alone are known not to flip.
     """
     stay, places, touched = np.zeros(len(before), np.bool_), after.copy(), moved.copy()
     for _ in range(_HOLDING_ROUNDS):
         is_done, held = True, np.zeros(len(before), np.bool_)
         for t in range(len(faces)):
             is_near = touched[faces[t, 0]] or touched[faces[t, 1]] or touched[faces[t, 2]]
-            if is_near and not allowed[t] and _is_flipped(places, faces, t):
+            if is_near and not allowed[t] and _orientation(places, faces, t)[0] <= _FLAT:
                 is_done = False
                 for k in range(3):
                     held[faces[t, k]] = True

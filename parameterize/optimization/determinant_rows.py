@@ -36,28 +36,14 @@ def short_rows(
     points = _bezier_points(control, first, weights)
     slopes = [_derivative(points, scale, direction) for direction, scale in enumerate(scales)]
     crosses = [cross_products(slopes[1], slopes[2])]
-    short = dot_products(slopes[0], crosses[0]).reshape(unscale.size, spans)
-    factors, counts, chosen, rest = unscale.ravel(), np.zeros(spans, np.int64), np.empty(spans, np.int64), 0
-    for i in range(len(factors)):
-        for s in range(spans):
-            short[i, s] = floors[s] - short[i, s] * (factors[i] / volumes[s])
-            counts[s] += short[i, s] > 0.0
-    for s in range(spans):
-        if counts[s]:
-            chosen[rest] = s
-            rest += 1
-    chosen, starts = chosen[:rest], np.zeros(rest + 1, np.int64)
-    for k in range(rest):
-        starts[k + 1] = starts[k] + counts[chosen[k]]
+    short, factors = dot_products(slopes[0], crosses[0]).reshape(unscale.size, spans), unscale.ravel()
+    chosen, starts = _taken_from(floors, short, factors, volumes)
     slopes, crosses = [_on_chosen(slope, chosen) for slope in slopes], [_on_chosen(crosses[0], chosen)]
     for direction in range(1, 3):
         crosses.append(cross_products(slopes[(direction + 1) % 3], slopes[(direction + 2) % 3]))
-    shortfall, rows, sums = (
-        np.empty(starts[-1]),
-        np.zeros((starts[-1], 3, n, n, n)),
-        np.empty((3, 4, 2 * n, 2 * n, 2 * n)),
-    )
-    for k in range(rest):
+    shortfall, rows = np.empty(starts[-1]), np.zeros((starts[-1], 3, n, n, n))
+    sums = np.empty((3, 4, 2 * n, 2 * n, 2 * n))
+    for k in range(len(chosen)):
         s, r = chosen[k], starts[k]
         _write_sums(crosses, k, sums)
         for i in range(len(factors)):
@@ -66,6 +52,24 @@ def short_rows(
                 _write_derivatives(i, sums, whole, factors[i] / volumes[s], rows[r])
                 r += 1
     return chosen, shortfall, rows, starts
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _taken_from(floors: Array, short: Array, factors: Array, volumes: Array) -> tuple[IntArray, IntArray]:
+    """Take coefficients in scaled form (q, k) from their floors, in place; return the spans where something is left.
+
+    The first row of each of these spans follows, and the number of rows.
+    """
+    counts = np.zeros(len(floors), np.int64)
+    for i in range(len(short)):
+        for s in range(len(floors)):
+            short[i, s] = floors[s] - short[i, s] * (factors[i] / volumes[s])
+            counts[s] += short[i, s] > 0.0
+    chosen = np.flatnonzero(counts)
+    starts = np.zeros(len(chosen) + 1, np.int64)
+    for k in range(len(chosen)):
+        starts[k + 1] = starts[k] + counts[chosen[k]]
+    return chosen, starts
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
@@ -179,15 +183,15 @@ def _along_axes(field: Array, u: Array, v: Array, w: Array) -> None:
 def combined(rows: Array, starts: IntArray, factors: Array, back: Array) -> Array:
     """Return the sum of each span's rows times their factors (r,), as windows (k, 3, n, n, n) of control points."""
     spans, n = len(starts) - 1, back.shape[2]
-    flat, windows = rows.reshape(len(rows), 3, n**3), np.zeros((spans, 3, n**3), rows.dtype)
+    flat, total = rows.reshape(len(rows), 3, n**3), np.zeros((spans, 3, n**3), rows.dtype)
     for s in range(spans):
         for r in range(starts[s], starts[s + 1]):
             for c in range(3):
                 for i in range(n**3):
-                    windows[s, c, i] += factors[r] * flat[r, c, i]
+                    total[s, c, i] += factors[r] * flat[r, c, i]
         for c in range(3):
-            _along_axes(windows[s, c], back[s, 0], back[s, 1], back[s, 2])
-    return windows.reshape(spans, 3, n, n, n)
+            _along_axes(total[s, c], back[s, 0], back[s, 1], back[s, 2])
+    return total.reshape(spans, 3, n, n, n)
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
@@ -206,12 +210,12 @@ def squared(control: Array, first: IntArray, rows: Array, starts: IntArray, shar
                     for k in range(n):
                         points[s, c, i, j, k] = control[c, u + i, v + j, w + k]
     factors = shares * _changes(rows, starts, points)
-    flat, windows = rows.reshape(len(rows), 3 * n**3), np.zeros((spans, 3 * n**3), rows.dtype)
+    flat, total = rows.reshape(len(rows), 3 * n**3), np.zeros((spans, 3 * n**3), rows.dtype)
     for s in range(spans):
         for r in range(starts[s], starts[s + 1]):
             for i in range(3 * n**3):
-                windows[s, i] += factors[r] * flat[r, i]
-    return windows.reshape(spans, 3, n, n, n)
+                total[s, i] += factors[r] * flat[r, i]
+    return total.reshape(spans, 3, n, n, n)
 
 
 @numba.njit(cache=True, nogil=True, fastmath={"contract", "reassoc"})  # type: ignore[untyped-decorator]
@@ -232,24 +236,24 @@ def _changes(rows: Array, starts: IntArray, points: Array) -> Array:
 def diagonal_blocks(rows: Array, starts: IntArray, shares: Array) -> Array:
     """Return the blocks on the diagonal of `squared`, as windows (k, 6, n, n, n)."""
     n = rows.shape[2]
-    flat, windows = rows.reshape(len(rows), 3, n**3), np.zeros((len(starts) - 1, 6, n**3), rows.dtype)
-    for s in range(len(windows)):
+    flat, total = rows.reshape(len(rows), 3, n**3), np.zeros((len(starts) - 1, 6, n**3), rows.dtype)
+    for s in range(len(total)):
         for r in range(starts[s], starts[s + 1]):
             for c in range(3):
                 for other in range(c + 1):
                     entry = c * (c + 1) // 2 + other
                     for i in range(n**3):
-                        windows[s, entry, i] += shares[r] * flat[r, c, i] * flat[r, other, i]
-    return windows.reshape(len(windows), 6, n, n, n)
+                        total[s, entry, i] += shares[r] * flat[r, c, i] * flat[r, other, i]
+    return total.reshape(len(total), 6, n, n, n)
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def add_windows(windows: Array, first: IntArray, total: Array) -> None:
-    """Add windows (k, m, n, n, n) to control points (m, n_u, n_v, n_w); each starts at its first control point."""
-    n = windows.shape[2]
+def add_windows(parts: Array, first: IntArray, total: Array) -> None:
+    """Add windows `parts` (k, m, n, n, n) to control points (m, n_u, n_v, n_w); each starts at its first one."""
+    n = parts.shape[2]
     for s in range(len(first)):
-        for c in range(windows.shape[1]):
+        for c in range(parts.shape[1]):
             for i in range(n):
                 for j in range(n):
                     for k in range(n):
-                        total[c, first[s, 0] + i, first[s, 1] + j, first[s, 2] + k] += windows[s, c, i, j, k]
+                        total[c, first[s, 0] + i, first[s, 1] + j, first[s, 2] + k] += parts[s, c, i, j, k]
