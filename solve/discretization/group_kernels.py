@@ -85,22 +85,36 @@ def tensors_of_rows(rows: Array, kappa: Array, patches: IntArray, point: int, fa
 
 
 @compiled
-def spread_fields(fields: Array, kinds: IntArray, tables: Tables, slopes: tuple[int, int], result: Array) -> None:
-    """Integrate fields (m, c, q_w, q_v), with weights, times each function of v and w: add to result (m, c, n_v, n_w).
+def add_integrals(
+    fields: Array,
+    patches: IntArray,
+    kinds: IntArray,
+    q: int,
+    tables: Tables,
+    slopes: tuple[int, int, int],
+    result: Array,
+) -> None:
+    """Add the integrals of `stack.PatchStack.add_integrals` to an array of all patches (k, c, n_u, n_v, n_w).
 
-    kinds: (m,). slopes: for v and w, the number of the table's values that are taken, 0 for the functions themselves.
+    fields: (m, c, q_w, q_v), of the patches (m,). kinds: (k,), of all patches. slopes: for each direction, the number
+    of the table's values that are taken, 0 for the functions themselves.
     """
-    _, (first_v, v, functions_v), (first_w, w, functions_w) = tables
-    d_v, d_w = slopes
-    n_w = result.shape[3]
+    d_u, d_v, d_w = slopes
+    n_v, n_w = result.shape[3:]
     lines = np.empty((fields.shape[3], n_w))
     for m in range(len(fields)):
-        kind = kinds[m]
+        patch = patches[m]
+        (first_u, u, functions_u), (first_v, v, functions_v), (first_w, w, functions_w) = of_kind(tables, kinds[patch])
         for c in range(fields.shape[1]):
-            turned = np.zeros((n_w, fields.shape[3]))
-            spread(first_w[kind], w[kind, d_w], functions_w, fields[m, c], turned)
+            turned, plane = np.zeros((n_w, fields.shape[3])), np.zeros((n_v, n_w))
+            spread(first_w, w[d_w], functions_w, fields[m, c], turned)
             transpose(turned, lines)
-            spread(first_v[kind], v[kind, d_v], functions_v, lines, result[m, c])
+            spread(first_v, v[d_v], functions_v, lines, plane)
+            for j in range(len(functions_u)):
+                layer, value = result[patch, c, first_u[q] + j], u[d_u, q, j]
+                for a in range(n_v):
+                    for b in range(n_w):
+                        layer[a, b] += value * plane[a, b]
 
 
 @compiled

@@ -223,13 +223,8 @@ class PatchStack:
         fields: (m, c, q_w, q_v), with weights, of m patches. result: (k, c, n_u, n_v, n_w). tables: in place of the
         stack's own. slopes: for each direction, 0 for the values in its table and 1 for the derivatives.
         """
-        tables = tables or self.tables
-        first, u, functions = tables[0]
-        kinds = self.kinds[patches]
-        planes = np.zeros((*fields.shape[:2], *result.shape[-2:]))
-        group_kernels.spread_fields(np.ascontiguousarray(fields), kinds, tables, slopes[1:], planes)
-        for j in range(len(functions)):
-            result[patches, :, first[kinds, q] + j] += u[kinds, slopes[0], q, j, None, None, None] * planes
+        own = np.ascontiguousarray(fields), patches, self.kinds, q, tables or self.tables
+        group_kernels.add_integrals(*own, slopes, result)
 
     def diagonals(self, factors: Array) -> Array:
         """Return the diagonals (k, n_u, n_v, n_w) of scalar operators: squared functions take the place of functions.
