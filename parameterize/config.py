@@ -77,6 +77,17 @@ class SplineConfig:
     rounds: int = 16  # at most, of a map that a trained network gives; other maps have some more
     steps: int = 60  # a round, at most
 
+    def __post_init__(self) -> None:
+        """Raise ValueError for a degree below 1, too few control points for it, and for numbers that are not whole."""
+        for what, number in (("degree", self.degree), ("number of control points", self.control_points)):
+            if not isinstance(number, Integral):
+                raise ValueError(f"the {what} must be a whole number, got {number!r:.80}")
+        if self.degree < 1:
+            raise ValueError(f"the degree must be at least 1, got {self.degree}")
+        if self.control_points <= self.degree:
+            fewest = self.degree + 1
+            raise ValueError(f"degree {self.degree} needs at least {fewest} control points, got {self.control_points}")
+
     @property
     def longest_edge(self) -> float:
         """Return the length at volume 1 above which the mesh's edges are cut: a span of the cube."""
@@ -188,14 +199,10 @@ class Config:
 
         Raises ValueError for too few, too many, or no whole number.
         """
-        if not isinstance(n, Integral):
-            raise ValueError(f"the number of control points must be a whole number, got {n!r:.80}")
-        if n <= self.spline.degree:
-            fewest = self.spline.degree + 1
-            raise ValueError(f"degree {self.spline.degree} needs at least {fewest} control points, got {n}")
+        spline = replace(self.spline, control_points=n)
         if n > MAX_CONTROL_POINTS:
             raise ValueError(f"at most {MAX_CONTROL_POINTS} control points per direction can be run, got {n}")
-        return replace(self, spline=replace(self.spline, control_points=n))
+        return replace(self, spline=spline)
 
 
 def scaled_steps(steps: int, factor: float) -> int:

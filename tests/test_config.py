@@ -7,7 +7,7 @@ import pytest
 
 import iga_nn
 import parameterize
-from parameterize.config import PRESETS, preset
+from parameterize.config import PRESETS, SplineConfig, preset
 from parameterize.training.losses import STAGES
 
 
@@ -58,6 +58,20 @@ def test_refined():
             config.refined(tolerance, 20)
     with pytest.raises(ValueError, match="between 12, the number of the first map, and 100, got 11"):
         config.refined(1e-3, 11)
+
+
+@pytest.mark.parametrize(
+    ("numbers", "message"),
+    [
+        ({"control_points": 3}, "degree 3 needs at least 4 control points, got 3"),
+        ({"control_points": (4, 7, 11)}, r"number of control points must be a whole number, got \(4, 7, 11\)"),
+        ({"degree": 0}, "degree must be at least 1, got 0"),
+        ({"degree": 2.5}, "degree must be a whole number, got 2.5"),
+    ],
+)
+def test_a_spline_that_does_not_exist_is_refused_at_once(numbers, message):
+    with pytest.raises(ValueError, match=message):
+        SplineConfig(**numbers)
 
 
 def test_with_control_points():

@@ -4,6 +4,7 @@ import json
 import threading
 import time
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from mesh_files import obj
@@ -13,10 +14,10 @@ import iga_nn
 from iga_nn.cli.commands import main
 from iga_nn.errors import InputError
 from iga_nn.options.texts import duration
-from iga_nn.workflow import time_limit
+from iga_nn.workflow import pipeline, time_limit
 from iga_nn.workflow.output_folder import RunFolder
 from iga_nn.workflow.time_limit import clock, demand_time
-from parameterize.time_limit import OutOfTime, closing, limited, reserving
+from parameterize.time_limit import OutOfTime, closing, limited, present_limit, reserving
 from solve import solve_with
 from solve.study import benchmark_volume
 
@@ -134,3 +135,12 @@ def test_figures_are_left_out_where_the_limit_is_long_over(tmp_path, monkeypatch
     with limited(-1.0):
         state.draw("map", volume=None)
         assert state.report["not_drawn"] == {"figures of the map": "the time limit is over"}
+
+
+def test_the_clock_does_not_end_the_page_of_a_map_that_is_done(monkeypatch):
+    """A plate was certified and written, and the run said that the limit came before there was a result."""
+    seen = []
+    monkeypatch.setattr(pipeline, "scene_of", lambda *_, **__: seen.append(present_limit().is_closing))
+    with limited(10.0):
+        assert pipeline._finish(SimpleNamespace(finish=lambda write: "done"), None) == "done"
+        assert seen == [True] and not present_limit().is_closing

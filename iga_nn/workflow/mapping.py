@@ -255,10 +255,15 @@ def read_corners(path: Path, frame: UnitFrame | None = None) -> Array | IntArray
     except (ValueError, TypeError, OverflowError, RecursionError):
         expected = 'a JSON list of eight points or of eight vertex numbers, or {"XYZ": eight points}'
         raise InputError(f"{path}: corners must be {expected}") from None
-    if rows.shape not in ((8, 3), (8,)) or not np.all(np.abs(rows) <= _LARGEST_COORDINATE):  # also refuses NaN
+    if rows.shape not in ((8, 3), (8,)):
         raise InputError(
-            f"{path}: corners must be eight points of three finite coordinates or eight vertex numbers, "
+            f"{path}: corners must be eight points of three coordinates or eight vertex numbers, "
             f"found an array of shape {rows.shape}"
+        )
+    if len(beyond := rows[~(np.abs(rows) <= _LARGEST_COORDINATE)]):  # NaN is one of them
+        raise InputError(
+            f"{path}: the numbers of corners must be finite and at most {_LARGEST_COORDINATE:g} in magnitude, "
+            f"found {beyond[0]:g}"
         )
     if rows.shape == (8, 3):
         return scaled.to_units(rows) if scaled else rows

@@ -213,10 +213,8 @@ def _solved(
     try:
         solution = solve_levels(state, body, problem, problem_options, options, kept)
     except OutOfTime:
-        with closing():
-            return _finish(state, body)
-    with closing():
-        return _finish(state, body, solution, problem, in_units(state, problem_options).units)
+        return _finish(state, body)
+    return _finish(state, body, solution, problem, in_units(state, problem_options).units)
 
 
 def _command(
@@ -504,6 +502,7 @@ def _finish(
     units: Units = NO_UNITS,
     scene: Any = None,
 ) -> Outcome:
-    """Finish the report, write the page that shows it and return the output folder."""
-    scene = scene or scene_of(state, body, solution, problem, units=units)
-    return state.finish(lambda folder, report: html.write(folder, report, scene))
+    """Finish the report, write the page that shows it and return the output folder; a time limit does not end this."""
+    with closing():
+        scene = scene or scene_of(state, body, solution, problem, units=units)
+        return state.finish(lambda folder, report: html.write(folder, report, scene))
