@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 from block_bodies import BODIES, fan, rod, uniform_nets
+from wavy import folded_over_edges
 
 from parameterize.optimization.adjacent_faces import next_faces
-from parameterize.optimization.sliding import SlidingParameters, fold_over_edges
+from parameterize.optimization.sliding import SlidingParameters
 from parameterize.quality.distortion import own_boxes
 
 TURNS = (0, 5, 7, 11)
@@ -78,7 +79,7 @@ def test_a_step_over_an_edge_goes_on_at_the_same_height_of_it(spline):
     """Twice over the same edge leads back, for all blocks taken as cubes."""
     table = next_faces(spline.nets)
     parameters, faces, crossed = places_beyond(spline)
-    there, found = fold_over_edges(spline.nets, parameters, faces)
+    there, found = folded_over_edges(spline.nets, parameters, faces)
     for row, (face, direction, side) in enumerate(crossed):
         other, inwards, end, reverse = table[face, direction, side]
         assert found[row] == other
@@ -87,7 +88,7 @@ def test_a_step_over_an_edge_goes_on_at_the_same_height_of_it(spline):
         assert there[row, across] == other % 2
         assert there[row, 3 - across - inwards] == pytest.approx(1.0 - along if reverse else along)
         there[row, inwards] += 0.1 * (2 * end - 1)  # out of the next face, over the edge again
-    back, again = fold_over_edges(spline.nets, there, found)
+    back, again = folded_over_edges(spline.nets, there, found)
     assert np.array_equal(again, faces)
     for row, (_, direction, side) in enumerate(crossed):
         parameters[row, direction] -= 0.1 * (2 * side - 1)

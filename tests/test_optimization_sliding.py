@@ -1,11 +1,11 @@
 import numpy as np
 import pytest
 from shapes import rounded_cube
-from wavy import NETS, as_volume, on_the_cube, wavy_control
+from wavy import NETS, as_volume, folded_over_edges, on_the_cube, wavy_control
 
 from parameterize.cube.cube import snap
 from parameterize.cube.flips import flipped
-from parameterize.optimization.sliding import SlidingParameters, fold_over_edges
+from parameterize.optimization.sliding import SlidingParameters
 
 LONGEST = 0.5 / max(NETS.shapes[0])  # step of a slide
 
@@ -130,13 +130,13 @@ def assert_on_the_cube(places):
     ],
 )
 def test_folding_over_edges(parameters, face, expected, expected_face):
-    found, faces = fold_over_edges(NETS, np.array([parameters]), np.array([face]))
+    found, faces = folded_over_edges(NETS, np.array([parameters]), np.array([face]))
     assert found[0].tolist() == pytest.approx(expected) and faces.tolist() == [expected_face]
 
 
 def test_folding_leaves_its_arguments_alone():
     parameters, faces = np.array([[1.0, 1.1, 0.6]]), np.array([1])
-    fold_over_edges(NETS, parameters, faces)
+    folded_over_edges(NETS, parameters, faces)
     assert parameters.tolist() == [[1.0, 1.1, 0.6]] and faces.tolist() == [1]
 
 
@@ -170,11 +170,11 @@ def test_a_fixed_parameter_stays_and_the_point_slides_along_its_edge():
 
 def test_a_point_on_an_edge_that_carries_it_stops_at_the_corner():
     fixed = np.array([[False, True, True]])
-    ended = fold_over_edges(NETS, np.array([[1.1, 1.0, 1.0]]), np.array([3]), fixed)
+    ended = folded_over_edges(NETS, np.array([[1.1, 1.0, 1.0]]), np.array([3]), fixed)
     assert ended[0].tolist() == [[1.0, 1.0, 1.0]] and ended[1].tolist() == [3]
 
 
 def test_a_point_on_a_rim_passes_the_corner():
     fixed = np.array([[False, False, True]])
-    parameters, faces = fold_over_edges(NETS, np.array([[1.1, 1.0, 1.0]]), np.array([3]), fixed)
+    parameters, faces = folded_over_edges(NETS, np.array([[1.1, 1.0, 1.0]]), np.array([3]), fixed)
     assert parameters[0] == pytest.approx([1.0, 0.9, 1.0]) and faces.tolist() == [1]

@@ -9,8 +9,6 @@ import numpy as np
 from ..arrays import Array, IntArray
 from ..spline.bernstein import along_second_axis, cross_products, dot_products, windows
 
-Three = tuple[Array, Array, Array]  # one array a direction
-
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def short_rows(
@@ -20,7 +18,7 @@ def short_rows(
     volumes: Array,
     floors: Array,
     whole: Array,
-    scales: Three,
+    scales: tuple[Array, Array, Array],
     unscale: Array,
 ) -> tuple[IntArray, Array, Array, IntArray]:
     """Return the spans (k,) that have coefficients below their floors, and these coefficients, span by span.

@@ -246,7 +246,7 @@ def _slide(
             for c in range(3):
                 parameters[n, c] = goal[n, c]
             cube_faces[n] = face
-            _fold(edges, parameters, cube_faces, fixed, n)
+            fold(edges, parameters, cube_faces, fixed, n)
             fill_window(polynomials, parameters, cube_faces, n, new_places, new_a, new_b)
             fill_tangents(new_places, new_a, new_b, control, n, found, 0)
             after = 0.0
@@ -292,36 +292,18 @@ def _held_back(
                 for c in range(3):
                     parameters[n, c] = before[n, c] + share[n] * (goal[n, c] - before[n, c])
                 if not is_last:
-                    _fold(edges, parameters, cube_faces, fixed, n)
+                    fold(edges, parameters, cube_faces, fixed, n)
         if not moved.any():
             break
     return parameters, cube_faces, changed
 
 
-def fold_over_edges(
-    nets: ControlNets, parameters: Array, cube_faces: IntArray, fixed: Mask | None = None
-) -> tuple[Array, IntArray]:
-    """Return parameters and faces after steps that left a face continue on the neighbouring face; all blocks are cubes.
-
-    The part of a step beyond the edge points inwards on the neighbouring face. fixed: as in SlidingParameters.
-    """
-    parameters, cube_faces = parameters.copy(), cube_faces.copy()
-    held = np.zeros(parameters.shape, dtype=bool) if fixed is None else fixed
-    _fold_all((next_faces(nets), np.ones((len(nets.knots), 3))), parameters, cube_faces, held)
-    return parameters, cube_faces
-
-
 @numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def _fold_all(edges: Edges, parameters: Array, cube_faces: IntArray, fixed: Mask) -> None:
-    for n in range(len(parameters)):
-        _fold(edges, parameters, cube_faces, fixed, n)
+def fold(edges: Edges, parameters: Array, cube_faces: IntArray, fixed: Mask, n: int) -> None:
+    """Continue the step of point n that left its face on the neighbouring face, in place.
 
-
-@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
-def _fold(edges: Edges, parameters: Array, cube_faces: IntArray, fixed: Mask, n: int) -> None:
-    """Continue the step of point n on the neighbouring face, in place.
-
-    The step ends at the ends of an edge that carries the point.
+    The part of the step beyond the edge points inwards there. The step ends at the ends of an edge that carries the
+    point. boxes, in `edges`, are the side lengths of the blocks; fixed: as in SlidingParameters.
     """
     table, boxes = edges
     face = cube_faces[n]

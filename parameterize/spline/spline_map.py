@@ -65,7 +65,10 @@ class ControlNets:
         return np.ascontiguousarray(part).reshape(*control.shape[:-1], *self.shapes[block])
 
     def joined(self, parts: list[Floats]) -> Floats:
-        """Return the control points (3, n) of all blocks from those of each block, (3, n_u, n_v, n_w)."""
+        """Return the control points (3, n) of all blocks from those of each block, (3, n_u, n_v, n_w).
+
+        Those of a single block are not copied.
+        """
         flat = [part.reshape(3, -1) for part in parts]
         return flat[0] if len(flat) == 1 else np.concatenate(flat, axis=1)
 

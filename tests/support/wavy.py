@@ -3,6 +3,8 @@
 import numpy as np
 
 from parameterize.cube.cube import nearest_faces
+from parameterize.optimization.adjacent_faces import next_faces
+from parameterize.optimization.sliding import fold
 from parameterize.spline.bspline import greville, open_uniform_knots
 from parameterize.spline.spline_map import ControlNets
 from parameterize.spline.volume import BSplineVolume
@@ -27,3 +29,12 @@ def as_volume(control):
 def on_the_cube(count, seed=0):
     parameters = nearest_on_cube(np.random.default_rng(seed).uniform(-0.2, 1.2, (count, 3)))
     return parameters, nearest_faces(parameters)
+
+
+def folded_over_edges(nets, parameters, cube_faces, fixed=None):
+    """Copies of parameters and faces after steps that left a face go on on the neighbouring one; blocks are cubes."""
+    parameters, cube_faces = parameters.copy(), cube_faces.copy()
+    held = np.zeros(parameters.shape, dtype=bool) if fixed is None else fixed
+    for n in range(len(parameters)):
+        fold((next_faces(nets), np.ones((len(nets.knots), 3))), parameters, cube_faces, held, n)
+    return parameters, cube_faces
