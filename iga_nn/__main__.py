@@ -10,12 +10,14 @@ from types import FrameType
 from .signals import loses_errors
 
 OBJECTS = 20_000  # new ones before Python looks for cycles: libraries make hundreds of thousands that stay
+UNREAD = 120  # Python's code where what is printed cannot be written
 PAUSE = 0.1  # seconds after which an interruption is tried again
 
 
 def run_and_exit() -> None:
     """Run the command line on the program's arguments."""
-    atexit.register(_fall_silent)  # the first one to be registered is the last one to be called
+    ended: list[int] = []
+    atexit.register(_leave, ended)  # the first one to be registered is the last one to be called
     try:
         catch_signals()
         gc.set_threshold(OBJECTS)
@@ -25,14 +27,20 @@ def run_and_exit() -> None:
     except KeyboardInterrupt:
         sys.stderr.write("iga-nn: interrupted; nothing was computed yet that could be resumed\n")
         code = 130
-    gc.freeze()  # else Python looks through all objects for cycles before it ends, for half a second
+    ended.append(code)
     sys.exit(code)
 
 
-def _fall_silent() -> None:
-    """Drop what libraries print once Python ends: igl lists each of its objects that `gc.freeze` leaves in a cycle."""
+def _leave(ended: list[int]) -> None:
+    """End the process with the code `ended`; Python would take a quarter of a second to free what libraries hold."""
+    if not ended or "mpi4py.MPI" in sys.modules:  # an error of ours; MPI has to hear that a process ends
+        return
+    try:
+        sys.stdout.flush()
+    except OSError:  # nobody reads on
+        ended = [UNREAD]
     sys.stderr.flush()
-    os.dup2(os.open(os.devnull, os.O_WRONLY), 2)
+    os._exit(ended[0])
 
 
 def catch_signals() -> None:

@@ -210,8 +210,8 @@ def in_this_process(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture
 def small_views(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Let VTK draw a tenth of the pixels, of coarser patches: without a graphics card they are what a figure costs."""
-    monkeypatch.setattr("iga_nn.figures.style.PANEL", (300, 233))
+    """Let VTK draw a quarter of the pixels, of coarser patches: without a graphics card a figure costs as much."""
+    monkeypatch.setattr("iga_nn.figures.style.PANEL", (220, 171))
     for module in ("map", "fields"):
         monkeypatch.setattr(f"iga_nn.figures.{module}.SAMPLES", 31)
     monkeypatch.setattr("iga_nn.figures.fields.OF_SEVERAL", (21, 9))
@@ -230,7 +230,7 @@ def in_folder(
     if request.node.get_closest_marker("pictures") is None:
         monkeypatch.setattr("iga_nn.figures.render.can_draw", lambda: False)
         monkeypatch.setattr("iga_nn.figures.panels.Picture.savefig", lambda _, path, **__: Path(path).touch())
-        empty = SimpleNamespace(print_png=lambda path, **_: Path(path).touch())
+        empty = SimpleNamespace(draw=lambda: None, buffer_rgba=lambda: np.zeros((1, 1, 4), dtype=np.uint8))
         monkeypatch.setattr("iga_nn.figures.style.FigureCanvasAgg", lambda _: empty)
     monkeypatch.chdir(tmp_path)
     return tmp_path

@@ -699,6 +699,7 @@ def test_an_interruption_in_the_middle_of_a_training_leaves_a_checkpoint(
 
     monkeypatch.setattr("parameterize.run.parameterize", parameterize)
     monkeypatch.setattr(sys, "argv", ["iga-nn", "parameterize", "bean"])
+    monkeypatch.setattr("atexit.register", lambda *_: None)  # what it does at the end of the process
     before = [(each, signal.getsignal(each)) for each in (signal.SIGINT, signal.SIGTERM)]
     signal.signal(signal.SIGINT, signal.default_int_handler)  # where pytest itself was started to ignore it
     try:

@@ -9,11 +9,12 @@ import pytest
 from conftest import formula_parameterization
 from matplotlib import colormaps
 from matplotlib.colors import rgb_to_hsv, to_rgb
+from matplotlib.figure import Figure
 from matplotlib.image import imread
 
 import solve
 from iga_nn.cli.commands import main
-from iga_nn.figures import colors, fields, line_plots, palette
+from iga_nn.figures import colors, fields, line_plots, palette, ticks
 from iga_nn.figures import cutaway as octant
 from iga_nn.figures import map as map_figures
 from iga_nn.figures import render as rendering
@@ -39,6 +40,34 @@ def test_history_marks_the_stages(tmp_path):
     line_plots.draw_history(tmp_path / "history.png", formula_parameterization().history)
     assert colored_share(tmp_path / "history.png") > 0.001
     assert [file.name for file in tmp_path.iterdir()] == ["history.png"]
+
+
+@pytest.mark.parametrize(
+    ("ends", "texts"),
+    [
+        ((1e-6, 1e2), ["10⁻⁶", "10⁻⁴", "10⁻²", "10⁰", "10²"]),
+        ((3e-4, 7e-3), ["5·10⁻⁴", "10⁻³", "2·10⁻³", "5·10⁻³"]),
+        ((2.5e-5, 4.5e-5), ["3·10⁻⁵", "4·10⁻⁵"]),
+    ],
+)
+def test_a_logarithmic_axis_shows_two_numbers_or_more(ends, texts):
+    axes = Figure().subplots()
+    axes.set(yscale="log", ylim=ends)
+    ticks.show_powers(axes.yaxis)
+    shown = {f"{place:.4g}": text for place, text in zip(axes.get_yticks(), labels(axes.yaxis), strict=True)}
+    seen = [text for place, text in shown.items() if ends[0] <= float(place) <= ends[1]]
+    assert [text for text in texts if text not in seen] == [] and len(seen) <= 9
+
+
+def labels(axis):
+    """The numbers that an axis shows at its ticks."""
+    axis.figure.draw_without_rendering()
+    return [tick.get_text() for tick in axis.get_ticklabels()]
+
+
+def test_numbers_on_an_axis_are_exact_to_four_digits():
+    values = (0.0, 1.0, 1e-12, 2.5e4, 3.315e-5, -10.0)
+    assert [ticks.in_powers(value) for value in values] == ["0", "10⁰", "10⁻¹²", "2.5·10⁴", "3.315·10⁻⁵", "-1·10¹"]
 
 
 def shown_terms(history):
@@ -234,7 +263,7 @@ def test_picture_is_framed_whole(drawing):
     square = np.stack(np.meshgrid([0.0, 2.0], [0.0, 1.0], [0.0], indexing="ij"), axis=-1)[:, :, 0]  # (2, 2, 3)
     red = np.broadcast_to([1.0, 0.0, 0.0], square.shape)
     view = rendering.widest_view(square.reshape(-1, 3))
-    image = rendering.draw([rendering.Patch(square, red, lit=False)], view, (400, 400))
+    (image,) = rendering.draw([rendering.Patch(square, red, lit=False)], [view], (400, 400))
     drawn = np.argwhere(image[..., 1] < 128)
     height, width = np.ptp(drawn, axis=0) + 1
     assert abs(width - 400 / 1.08) < 6 and abs(height - 200 / 1.08) < 6  # the longer side fills the frame, 4 % margin
@@ -245,7 +274,7 @@ def test_marks_on_a_surface_are_seen(drawing):
     square = np.stack(np.meshgrid([0.0, 2.0], [0.0, 1.0], [0.0], indexing="ij"), axis=-1)[:, :, 0]
     patch = rendering.Patch(square, np.broadcast_to([1.0, 0.0, 0.0], square.shape), lit=False)
     view = rendering.widest_view(square.reshape(-1, 3))
-    image = rendering.draw([patch], view, (400, 400), marks=np.array([[1.0, 0.5, 0.0]]))
+    (image,) = rendering.draw([patch], [view], (400, 400), marks=np.array([[1.0, 0.5, 0.0]]))
     assert np.all(image[200, 200] < 60) and np.all(image[200, 240] == [255, 0, 0])
 
 

@@ -5,7 +5,7 @@ import pytest
 from matplotlib.patches import Patch as Swatch
 
 from iga_nn.figures.colors import ColorRange
-from iga_nn.figures.panels import VIEW, panels_of
+from iga_nn.figures.panels import VIEW, Rendered, panels_of
 from iga_nn.figures.style import color_bar, name_below, save
 
 WIDE = ColorRange(-123456.789, 234567.8, beyond=1e6)
@@ -32,7 +32,7 @@ def test_a_legend_of_long_names_fits_on_the_figure(name):
 def test_no_text_leaves_the_figure_and_no_view_changes_its_size(rows, columns, limits, heading):
     figure, panels = panels_of(rows, columns)
     for panel in panels.flat:
-        panel.imshow(np.zeros((56, 72, 3)))
+        Rendered(panel, np.zeros((56, 72, 3), dtype=np.uint8))
         panel.set_title("front", fontsize=13, y=1.0)
     name_below(figure, [Swatch(label=f"p{k}, p{k + 20}") for k in range(3 * columns)], 3)
     if limits is not None:

@@ -166,7 +166,12 @@ def test_figures_show_all_patches(tmp_path, drawing, small_views):
 def shown(monkeypatch):
     """The patches that would be drawn, panel after panel."""
     found = []
-    monkeypatch.setattr(style, "draw", lambda patches, *_: found.append(patches) or np.zeros((2, 2, 3)))
+
+    def draw(patches, views, *_):
+        found.extend([patches] * len(views))
+        return [np.zeros((2, 2, 3), dtype=np.uint8)] * len(views)
+
+    monkeypatch.setattr(style, "draw", draw)
     return found
 
 

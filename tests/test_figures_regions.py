@@ -12,6 +12,7 @@ import iga_nn
 from iga_nn.figures import regions as figures
 from iga_nn.figures import render
 from iga_nn.figures.first_view import best_sides
+from iga_nn.figures.panels import Rendered
 from parameterize.surface.surface import surface_from_arrays
 
 
@@ -106,6 +107,7 @@ def test_the_picture_shows_the_region_and_grey(tmp_path):
     figure = figures.draw_regions(None, surface, [iga_nn.Region("nz > 0.9")])
     blue = []
     for panel in figure.axes:
-        pixels = rgb_to_hsv(panel.images[0].get_array().reshape(-1, 3) / 255.0)
+        (view,) = (artist for artist in panel.get_children() if isinstance(artist, Rendered))
+        pixels = rgb_to_hsv(view.pixels.reshape(-1, 3) / 255.0)
         blue.append(np.count_nonzero((pixels[:, 1] > 0.5) & (np.abs(pixels[:, 0] - 0.57) < 0.05)))
     assert max(blue) > 1000 and min(blue) < 500 and (tmp_path / "a.png").is_file()  # one side shows the top

@@ -117,7 +117,7 @@ def test_a_solve_of_data_alone_has_its_picture_and_a_field_in_the_view(solved):
 
 
 def test_a_field_has_one_range_in_figure_and_view(monkeypatch):
-    monkeypatch.setattr("iga_nn.figures.style.draw", lambda *_: np.zeros((2, 2, 3)))
+    monkeypatch.setattr("iga_nn.figures.style.draw", lambda _, views, *__: [np.zeros((2, 2, 3), np.uint8)] * len(views))
     volume, problem = benchmark_volume(2), solve.Poisson(exact="exp(x)*sin(4*y)*z")
     solution = solve.solve_problem(volume, problem, refine=1)
     low, high = draw_error(None, volume, solution, problem).axes[-1].get_ylim()

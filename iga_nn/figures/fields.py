@@ -19,7 +19,7 @@ from typing import Any, Self, TypeVar, cast
 import numpy as np
 from numpy.typing import ArrayLike
 
-from parameterize.arrays import Array, IntArray
+from parameterize.arrays import Array, IntArray, ends_of
 from parameterize.quality.distortion import in_boxes, own_boxes, unmirrored
 from parameterize.spline.body import BodyLike, as_body
 from parameterize.spline.orientation import orientation, orientations
@@ -122,7 +122,7 @@ class Samples:
     @property
     def diagonal(self) -> float:
         """Return the diagonal of the box of all samples of points."""
-        return float(np.linalg.norm(np.ptp(self.cloud, axis=0)))
+        return float(np.linalg.norm(np.subtract(*ends_of(self.cloud))))
 
     def each(self, change: Callable[[Array], Array]) -> "Samples":
         """Return the samples that a function of arrays makes of these."""

@@ -17,6 +17,7 @@ from ..options import NO_UNITS, Units
 from .colors import FACE_COLORS, with_unit
 from .panels import DPI, Picture
 from .style import positive, save
+from .ticks import in_powers, show_powers
 
 TERMS = {  # of the loss, as parameterize names them
     "arap": "ARAP distortion",
@@ -52,11 +53,13 @@ def draw_history(path: Path | None, history: dict[str, NDArray[Any]]) -> Figure:
         upper.plot(steps, values, alpha=0.8, label=TERMS.get(name, name), **style)
     upper.plot(steps, positive(history["loss"]), color="black", linewidth=1.4, label="loss")
     upper.set_yscale("log")
+    show_powers(upper.yaxis)
     upper.set_ylim(bottom=max(upper.get_ylim()[0], lowest))  # terms start at zero
     upper.set_ylabel("loss, and its terms without their weights")
     upper.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False)
     lower.plot(steps, history["folded"], color="firebrick", linewidth=1.0)
     lower.set_yscale("symlog", linthresh=1.0)
+    lower.yaxis.set_major_formatter(in_powers)
     lower.set_ylim(bottom=0.0)
     lower.set_ylabel("folded samples")
     lower.set_xlabel("step")
@@ -93,6 +96,7 @@ def draw_study(path: Path | None, study: Study) -> Figure:
         counts = sorted({round(level.report.elements ** (1.0 / 3.0)) for levels in study.values() for level in levels})
         panel.set_xticks([1.0 / count for count in counts], [f"1/{count}" for count in counts])
         panel.xaxis.set_minor_locator(NullLocator())
+        show_powers(panel.yaxis)
         panel.set_xlabel("h, the edge of an element in the unit cube")
         panel.set_title(f"{title} error", y=1.0)
         panel.set_ylabel("relative" if is_relative else "absolute")
@@ -146,4 +150,5 @@ def _add_absolute_axis(panel: Any, errors: Sequence[tuple[float, float]]) -> Non
     if norms and max(norms) <= (1.0 + SAME_NORM) * min(norms):
         norm = norms[-1]
         axis = panel.secondary_yaxis("right", functions=(lambda y: norm * y, lambda y: y / norm))
+        show_powers(axis.yaxis)
         axis.set_ylabel("absolute")

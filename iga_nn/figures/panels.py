@@ -4,12 +4,18 @@ import io
 from typing import Any
 
 import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.backend_bases import RendererBase
 from matplotlib.figure import Figure
 from matplotlib.text import Text
+from matplotlib.transforms import Bbox
+from numpy.typing import NDArray
+from PIL import Image
 
-PANEL = (720, 560)  # pixels of one view
+PANEL = (440, 342)  # pixels of one view
 DPI = 110
-VIEW = (4.0, 4.0 * PANEL[1] / PANEL[0])  # inches of one view
+VIEW = (PANEL[0] / DPI, PANEL[1] / DPI)  # inches of one view
 GAP, TITLE, HEADING, LINE, ROW, BAR = 0.15, 0.32, 0.4, 0.32, 0.28, 1.7  # inches; ROW of a legend
 BAR_PLACE = (0.3, 0.2)  # inches of a colour bar: its distance from the views, its width
 BAR_LENGTH = 0.85  # of the views' height
@@ -24,6 +30,29 @@ class Picture(Figure):
         stream = io.BytesIO()
         self.savefig(stream, format="png", dpi=NOTEBOOK_DPI)
         return stream.getvalue()
+
+
+class Rendered(Artist):
+    """A picture (height, width, 3) that fills axes; matplotlib's own is sampled anew, which takes as long as VTK."""
+
+    def __init__(self, axes: Axes, pixels: NDArray[np.uint8]) -> None:
+        super().__init__()
+        self.pixels = pixels
+        axes.add_artist(self)
+
+    def get_window_extent(self, renderer: RendererBase | None = None) -> Bbox:
+        """Return the place of the axes on the figure."""
+        assert self.axes is not None
+        return self.axes.get_window_extent(renderer)
+
+    def draw(self, renderer: RendererBase) -> None:
+        """Draw the pixels as they are, or, at another number of dots an inch, resized."""
+        place, finer = self.get_window_extent(renderer), renderer.get_image_magnification()
+        size = round(finer * place.width), round(finer * place.height)
+        picture = Image.fromarray(self.pixels).convert("RGBA")
+        if picture.size != size:
+            picture = picture.resize(size)
+        renderer.draw_image(renderer.new_gc(), place.x0, place.y0, np.asarray(picture)[::-1])
 
 
 class Panels(Picture):

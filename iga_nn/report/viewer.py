@@ -15,7 +15,7 @@ from typing import Any, Self
 
 import numpy as np
 
-from parameterize.arrays import IntArray, Knots, Mask
+from parameterize.arrays import IntArray, Knots, Mask, ends_of
 from parameterize.spline.body import BodyLike, as_body
 from parameterize.spline.bspline import breakpoints
 from parameterize.spline.volume import AXES, FACE_NAMES
@@ -179,7 +179,7 @@ def _scene(
     """
     points, patches = points_of(body), as_body(body).patches
     drawn = Drawn(outer_faces(body), _coarser(points, coarser))
-    low, high = points.cloud.min(axis=0), points.cloud.max(axis=0)
+    low, high = ends_of(points.cloud)
     left_out, view = cut_of(body, points, points, shown_from(body, solution))
     count, many = (part.shape[1] for part in drawn.thinned(points))
     whole = [replace(frames[0], fields=[*frames[0].fields, distortion_of(body)]), *frames[1:]]

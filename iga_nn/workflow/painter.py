@@ -6,6 +6,7 @@ if it crashes, the run does not. It ends with its input, however the run ends.
 
 from __future__ import annotations
 
+import gc
 import logging
 import os
 import pickle
@@ -117,9 +118,12 @@ def main() -> None:
     warnings: list[str] = []  # which the run tells
     logging.getLogger("iga_nn").addHandler(Told(lambda record: warnings.append(record.getMessage()), logging.WARNING))
     logging.getLogger("iga_nn").propagate = False
+    gc.disable()  # else Python looks for cycles among what libraries make while they are imported
     with suppress(Exception):  # what fails now fails again where it is needed, and is told
         _can_draw()
         import_module("iga_nn.figures.solution")
+    gc.freeze()
+    gc.enable()
     while True:
         failures = drawing.draw(given.get(), _can_draw)
         pickle.dump((failures, warnings), answers)
