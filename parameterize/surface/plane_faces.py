@@ -44,7 +44,7 @@ def planes_of(vertices: Array, faces: IntArray, most: int) -> Planes | None:
     normals, areas = normals_and_areas(vertices, faces)
     diagonal = float(np.linalg.norm(np.ptp(vertices, axis=0)))
     slivers = areas < _SLIVER * diagonal**2
-    beside = _neighbours(faces)
+    beside, (first, second, third) = _neighbours(faces), np.ascontiguousarray(faces.T)
     parts = np.full(len(faces), -1, dtype=np.int64)
     found: list[tuple[Array, float]] = []
     for seed in np.argsort(-areas, kind="stable"):
@@ -55,8 +55,8 @@ def planes_of(vertices: Array, faces: IntArray, most: int) -> Planes | None:
         normal, offset = normals[seed], float(normals[seed] @ vertices[faces[seed, 0]])
         members = np.array([seed])
         for _ in range(_REFITS):
-            near = np.abs(vertices @ normal - offset)[faces].max(axis=1) <= FLAT * diagonal
-            suits = near & (slivers | (normals @ normal > _PARALLEL)) & (parts < 0)
+            near = np.abs(vertices @ normal - offset) <= FLAT * diagonal
+            suits = near[first] & near[second] & near[third] & (slivers | (normals @ normal > _PARALLEL)) & (parts < 0)
             grown = _reached(int(seed), suits, beside)
             if len(grown) <= len(members):
                 break

@@ -17,6 +17,7 @@ from ..planar.polygons import area_of
 
 _MOST_AXES = 6  # that are tried: the normals with the most area
 _ALIKE = 1e-3  # the normals in one cell of this size are one direction
+_CELLS = round(4.0 / _ALIKE)  # more than there are in a direction
 SAME = 1e-5  # relative: the volume of the slabs is that of the surface
 MOST_SLABS = 12  # a body of more is round along the axis, too
 
@@ -91,7 +92,8 @@ def axes_of(areas: Array) -> Iterator[Array]:
     rows, sizes = areas[sizes > 0.0], sizes[sizes > 0.0]
     largest = np.abs(rows).argmax(axis=1)
     rows = rows * np.sign(rows[np.arange(len(rows)), largest])[:, None]
-    _, cells = np.unique(np.round(rows / sizes[:, None] / _ALIKE).astype(int), axis=0, return_inverse=True)
+    places = np.round(rows / sizes[:, None] / _ALIKE).astype(np.int64)
+    _, cells = np.unique(places @ (_CELLS ** np.array([2, 1, 0])), return_inverse=True)
     sums = np.stack([np.bincount(cells, column) for column in rows.T], axis=1)
     lengths = np.linalg.norm(sums, axis=1)
     for cell in np.argsort(-lengths, kind="stable")[:_MOST_AXES]:
@@ -101,11 +103,14 @@ def axes_of(areas: Array) -> Iterator[Array]:
 def _levels(vertices: Array, faces: IntArray, axis: Array, near: float) -> Array | None:
     """Return the heights of the faces across an axis; None where a triangle is neither across nor along the axis."""
     heights = vertices @ axis
-    across = np.ptp(heights[faces], axis=1) <= near
+    first, second, third = heights[faces.T]
+    across = np.maximum(np.maximum(first, second), third) - np.minimum(np.minimum(first, second), third) <= near
+    if not np.any(across):
+        return None
     flat = vertices - heights[:, None] * axis
     sides = np.linalg.norm(flat[faces] - flat[np.roll(faces, 1, axis=1)], axis=2).max(axis=1)
     widths = np.abs(doubled_areas(vertices, faces) @ axis) / np.maximum(sides, 1e-300)  # seen along the axis
-    if not np.any(across) or np.any(~across & (widths > near)):
+    if np.any(~across & (widths > near)):
         return None
     levels = np.sort(heights[faces[across]].ravel())
     groups = np.split(levels, np.flatnonzero(np.diff(levels) > near) + 1)
