@@ -12,12 +12,20 @@ from .tensor_product import KroneckerInverse
 
 
 def fit_pairs(
-    parameters: Array, points: Array, weights: Array, knots: Knots, degree: int, *, fairness: float
+    parameters: Array,
+    points: Array,
+    weights: Array,
+    knots: Knots,
+    degree: int,
+    *,
+    fairness: float,
+    tolerance: float = 1e-5,
 ) -> SplineMap:
     """Return the map that minimises sum w |F(parameters) - points|^2 + fairness int |Hessian|^2.
 
     parameters: (m, 3) in the unit cube. points: (m, 3). weights: (m,), with sum 1. This is the discrete form of the
     paper's least squares on G(F(x)) = x. In spans without samples the smoothing term alone determines the map.
+    tolerance: of the linear system's residual, relative.
     """
     sizes, span = [len(k) - degree - 1 for k in knots], (degree + 1) ** 3
     tables = [basis_derivatives(k, degree, parameters[:, d]) for d, k in enumerate(knots)]
@@ -32,5 +40,5 @@ def fit_pairs(
     precondition = KroneckerInverse(tuple(fairness * c for c in curve), mass, shift=1.0)
     operator = weighted_sum([(1.0, rows.squared(weights[:, None, None] * np.eye(3))), (1.0, smooth)])
     right = rows.adjoint(weights[:, None] * points, np.zeros((3, *sizes)))
-    found = conjugate_gradients(operator, right, precondition, tolerance=1e-5, max_iterations=300)
+    found = conjugate_gradients(operator, right, precondition, tolerance, max_iterations=300)
     return SplineMap.on_cube(degree, knots, found.x)

@@ -22,6 +22,7 @@ from .way import Suits, Way
 MORE_ROUNDS = 4  # than after a trained network: such shapes are hard
 COARSE = 5 / 9  # of the spans a direction, in the first rounds: enough for the shape, at a fraction of the time
 _BOUNDARY_SHARE = 0.2  # weight of the surface's samples; those inside have the rest of 1, and so decide where F folds
+_TOLERANCE = 1e-3  # of the fit: the rounds move the map much farther
 _FAIRNESS = 1e-7  # of the fit: determines coefficients without samples, and hardly moves the rest
 
 
@@ -84,4 +85,5 @@ def first_spline(inside: Array, places: Array, fit: Correspondence) -> SplineMap
         fit.sliding.knots,
         fit.sliding.nets.degree,
         fairness=_FAIRNESS,
+        tolerance=_TOLERANCE,
     )
