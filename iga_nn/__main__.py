@@ -9,7 +9,7 @@ from types import FrameType
 
 from .signals import loses_errors
 
-OBJECTS = 20_000  # new ones before Python looks for cycles: libraries make hundreds of thousands that stay
+OBJECTS = 1_000_000  # new ones before Python looks for cycles: it finds those of libraries, which stay, none of ours
 UNREAD = 120  # Python's code where what is printed cannot be written
 PAUSE = 0.1  # seconds after which an interruption is tried again
 
@@ -35,12 +35,13 @@ def _leave(ended: list[int]) -> None:
     """End the process with the code `ended`; Python would take a quarter of a second to free what libraries hold."""
     if not ended or "mpi4py.MPI" in sys.modules:  # an error of ours; MPI has to hear that a process ends
         return
-    try:
-        sys.stdout.flush()
-    except OSError:  # nobody reads on
-        ended = [UNREAD]
-    sys.stderr.flush()
-    os._exit(ended[0])
+    code = ended[0]
+    for stream in filter(None, (sys.stdout, sys.stderr)):
+        try:
+            stream.flush()
+        except (OSError, ValueError):  # nobody reads on, or it is closed
+            code = UNREAD
+    os._exit(code)
 
 
 def catch_signals() -> None:
