@@ -48,15 +48,17 @@ def test_history_marks_the_stages(tmp_path):
         ((1e-6, 1e2), ["10⁻⁶", "10⁻⁴", "10⁻²", "10⁰", "10²"]),
         ((3e-4, 7e-3), ["5·10⁻⁴", "10⁻³", "2·10⁻³", "5·10⁻³"]),
         ((2.5e-5, 4.5e-5), ["3·10⁻⁵", "4·10⁻⁵"]),
+        ((9e-8, 1.63e-7), ["10⁻⁷", "1.2·10⁻⁷", "1.4·10⁻⁷", "1.6·10⁻⁷"]),
+        ((3.21, 3.21003), ["3.21001", "3.21002"]),
     ],
 )
 def test_a_logarithmic_axis_shows_two_numbers_or_more(ends, texts):
     axes = Figure().subplots()
     axes.set(yscale="log", ylim=ends)
     ticks.show_powers(axes.yaxis)
-    shown = {f"{place:.4g}": text for place, text in zip(axes.get_yticks(), labels(axes.yaxis), strict=True)}
-    seen = [text for place, text in shown.items() if ends[0] <= float(place) <= ends[1]]
-    assert [text for text in texts if text not in seen] == [] and len(seen) <= 9
+    pairs = zip(axes.get_yticks(), labels(axes.yaxis), strict=True)
+    seen = [text for place, text in pairs if ends[0] <= place <= ends[1]]
+    assert set(texts) <= set(seen) and len(set(seen)) == len(seen) <= 10
 
 
 def labels(axis):
@@ -65,9 +67,9 @@ def labels(axis):
     return [tick.get_text() for tick in axis.get_ticklabels()]
 
 
-def test_numbers_on_an_axis_are_exact_to_four_digits():
-    values = (0.0, 1.0, 1e-12, 2.5e4, 3.315e-5, -10.0)
-    assert [ticks.in_powers(value) for value in values] == ["0", "10⁰", "10⁻¹²", "2.5·10⁴", "3.315·10⁻⁵", "-1·10¹"]
+def test_numbers_on_an_axis_have_eight_digits_at_most():
+    values = (0.0, 1.0, 1e-12, 2.5e4, 3.315e-5, 3.1234567)
+    assert [ticks.in_powers(value) for value in values] == ["0", "10⁰", "10⁻¹²", "2.5·10⁴", "3.315·10⁻⁵", "3.1234567"]
 
 
 def shown_terms(history):
