@@ -42,14 +42,14 @@ def show(
     unit: str | None = None,
 ) -> None:
     """Draw patches on a panel under a title. marks, names, unit: as in `draw`."""
-    _show_all([panel], [title], patches, [view], marks, names, unit)
+    (picture,) = draw(patches, [view], PANEL, marks, names, unit)
+    _fill(panel, title, picture)
 
 
-def _show_all(panels: Any, titles: Sequence[str], patches: Sequence[Patch], views: Sequence[View], *shown: Any) -> None:
-    """Draw the same patches on several panels. shown: marks, names and unit, as in `draw`."""
-    for panel, title, picture in zip(panels, titles, draw(patches, views, PANEL, *shown), strict=True):
-        Rendered(panel, picture)
-        panel.set_title(title, fontsize=13, y=1.0)  # a given place is not looked for
+def _fill(panel: Any, title: str, picture: NDArray[np.uint8]) -> None:
+    """Fill a panel with a picture, and write its title."""
+    Rendered(panel, picture)
+    panel.set_title(title, fontsize=13, y=1.0)  # a given place is not looked for
 
 
 def draws() -> bool:
@@ -72,7 +72,9 @@ def show_around(
     view: from the front; by default the widest one.
     """
     view = view or view_of(patches)
-    _show_all(panels, ("front", "back"), patches, (view, view.turned()), marks, names, unit)
+    pictures = draw(patches, (view, view.turned()), PANEL, marks, names, unit)
+    for panel, title, picture in zip(panels, ("front", "back"), pictures, strict=True):
+        _fill(panel, title, picture)
 
 
 def show_inside(panels: Any, body: BodyLike, points: Samples, painted: Painted) -> None:
